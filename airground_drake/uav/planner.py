@@ -168,23 +168,43 @@ class Planner:
         # standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
-        reported = {outline for report in heard for outline in report.sensed}
-        there = (np.less_equal(self.mapped_from, t + SAME_S)) & np.less(t + SAME_S, self.mapped_until)
-        there = np.broadcast_to(there, len(self.mapped))
-        mapped = self.mapped[there]
+        unknown = {row for report in heard for row in report.sensed} - set(memory.learnt)
+        fresh: tuple[Outline, ...] = ()
+        if unknown:
+            there = self._there(t)
+            fresh = tuple(sorted((row for row in unknown if not self._is_on_map(row, there)), key=_place))
+        talks = self._after_answers(memory.talks, t, positions, intervening, said, reports, learnt=bool(fresh))
+        newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen} | {
             sighting.name: (sighting, t) for report in heard for sighting in report.seen
         }
+        memory = replace(
+            memory,
+            talks=tuple(talks),
+            learnt=memory.learnt + fresh,
+            read=(*memory.read, *((report.number, t) for report in heard if report.number > newest)),
+            seen=tuple(latest.values()),
+        )
+        if not any(called and talk.is_due(t) for called, talk in zip(intervening, talks, strict=True)):
+            return memory
+        return self._asked(memory, t, positions, intervening, answers, standing, sightings)
+
+    def _asked(
+        self,
+        memory: PlannerState,
+        t: float,
+        positions: Array,
+        intervening: Sequence[bool],
+        answers: Array,
+        standing: Sequence[bool],
+        sightings: Sequence[Sighting],
+    ) -> PlannerState:
+        """The memory after the policies were asked for all triggered UGVs that need a proposal."""
+        mapped = self.mapped[self._there(t)]
+        obstacles = outline.joined(mapped, outline.stacked(memory.learnt)) if memory.learnt else mapped
+        latest = {sighting.name: (sighting, when) for sighting, when in memory.seen}
         moving = self._moving(t, {sighting.name: sighting for sighting in sightings}, latest)
-        unknown = reported - set(memory.learnt)
-        fresh = tuple(sorted((row for row in unknown if not self._is_on_map(row, there)), key=_place))
-        learnt = memory.learnt + fresh
-        obstacles = outline.joined(mapped, outline.stacked(learnt)) if learnt else mapped
-        talks = self._after_answers(memory.talks, t, positions, intervening, said, reports, learnt=bool(fresh))
-        asked = list(memory.asked)
-        memories = dict(enumerate(memory.memories))
-        newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
-        read = [(report.number, t) for report in heard if report.number > newest]
+        talks, asked, memories = list(memory.talks), list(memory.asked), dict(enumerate(memory.memories))
         for i, robot in enumerate(self.ugvs):
             if not (intervening[i] and talks[i].is_due(t)):
                 continue
@@ -207,10 +227,13 @@ class Planner:
             changed, policies = self.database.plan(talks[i], seen, memories)
             asked += policies
             talks = [changed.get(name, talk) for name, talk in zip(self.ugvs, talks, strict=True)]
-        return replace(
-            memory, talks=tuple(talks), learnt=learnt, asked=tuple(asked), read=(*memory.read, *read),
-            seen=tuple(latest.values()), memories=tuple(map(memories.get, range(len(self.database.policies)))),
-        )  # fmt: skip
+        remembered = tuple(map(memories.get, range(len(self.database.policies))))
+        return replace(memory, talks=tuple(talks), asked=tuple(asked), memories=remembered)
+
+    def _there(self, t: float) -> npt.NDArray[np.bool_]:
+        """Which of the outlines on the map are there at time t, s, (m,)."""
+        there = np.less_equal(self.mapped_from, t + SAME_S) & np.less(t + SAME_S, self.mapped_until)
+        return np.broadcast_to(there, len(self.mapped))
 
     def _moving(
         self, t: float, now: Mapping[str, Sighting], latest: Mapping[str, tuple[Sighting, float]]

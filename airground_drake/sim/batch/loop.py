@@ -40,6 +40,8 @@ Bools = npt.NDArray[np.bool_]
 CONTROL, PLAN, GATE, NOISE = 1, 2, 4, 8
 # Why the loop stops: the end; an update for Python; no room for another row; as in Drake, an error.
 DONE, PYTHON, FULL, NOT_A_NUMBER, SHORT_STEPS, NOT_FINITE = 0, 1, 2, 3, 4, 5
+# How it is entered: at the beginning of a run, to go on with it, or to publish a row for which there was no room.
+BEGIN, GO_ON, AGAIN = 0, 1, 2
 SIGNALS = 4  # of a unicycle: the place of its axle, m, and its heading, rad
 
 
@@ -160,8 +162,9 @@ def headings_at(t: float, state: State, steering: Array, period: float) -> Array
 
 
 @njit(cache=True)
-def advance(team: Team, around: Around, accepted: Accepted, state: State, log: Log, until: float, first: bool) -> int:
-    """Simulate up to a time, s, or to an update that Python makes; `first` begins a run. Returns why it stopped."""
+def advance(team: Team, around: Around, accepted: Accepted, state: State, log: Log, until: float, enter: int) -> int:
+    """Simulate up to a time, s, or to an update that Python makes; returns why it stopped."""
+    # At that time the row is published, and the updates of the instant are still to be made.
     # Reading an array of a tuple counts references: once, here.
     law, layer, uav_task, steering, turns, levels, corners, breaks, holds = team[:9]
     script_of, script_breaks, script_holds, room, numbers, ticks, due, draws, gated, remembers, watchful = team[9:]
@@ -179,7 +182,7 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
     began, noise_began, script_rate = np.empty((r, 3)), np.empty(n), np.empty(3)
     t, tick, rows, mask, resumed = time[0], counts[0], counts[1], counts[3], counts[4] == 1
     begun, now, code = held_begun.copy(), held_now.copy(), -1
-    if first:
+    if enter == BEGIN:
         hold(breaks, holds, t, reference[: 3 * n], reference[3 * n :])
         for k in range(len(script_of) - 1):
             rows_of = slice(script_of[k], script_of[k + 1])
@@ -188,7 +191,7 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
         begun = now
         automaton.begin(status, t, now[5::5], levels)
         time[1] = t
-    span, ended = ranges(begun, now, corners), not resumed
+    span, ended = ranges(begun, now, corners), enter != GO_ON
     while True:
         if ended:
             if rows >= len(log_t):
@@ -207,10 +210,9 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
                         at += SIGNALS
                 log_share[rows] = share
             rows += 1
-            if t >= until and not first:
+            if t >= until:
                 code = DONE
                 break
-            first = False
         ended = True
         if not resumed:  # unrestricted updates
             awake = watchful and mask & CONTROL != 0

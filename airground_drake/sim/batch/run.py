@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from airground_drake.sim.blocks.plant import vertices_of
 from airground_drake.sim.blocks.ticks import Ticks
 from airground_drake.sim.recording import Done, trace_of
 from airground_drake.sim.trace import Trace
+from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, accepted_proposals, sightings
 from airground_drake.uav.planner import PlannerState, sent_after
@@ -51,10 +53,10 @@ class Batch:
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Set it up: everything that does not depend on the seed."""
-        self._scenario, self._name = scenario, name
+        self.scenario, self.name = scenario, name
         run, given = scenario.runs[name], own(scenario, name)
         method, control = method_of(run.method), given.control
-        self._world = world = make_world(given)
+        self.world = world = make_world(given)
         n, r = len(world.names("ugv")), len(world.robots)
         for body in world.moving:
             if not isinstance(body.plant, FirstOrder | Unicycle | Scripted):
@@ -62,22 +64,22 @@ class Batch:
         if UAV_TASKS.load(given.uav.task, of=Task) is not FormationTask:
             raise LeftToDrakeError(f"the task {given.uav.task} of the UAV")
         presets = components.make_presets(given)
-        self._law = components.make_law(given, method, run.composition)  # type: ignore[arg-type]
-        self._planner = components.make_planner(given, method)
-        self._gatekeepers: Gatekeepers | None = components.make_gatekeepers(given, self._law) if method.gated else None
+        self.law = components.make_law(given, method, run.composition)  # type: ignore[arg-type]
+        self.planner = components.make_planner(given, method)
+        self.gatekeepers: Gatekeepers | None = components.make_gatekeepers(given, self.law) if method.gated else None
         self._avoidance = components.make_avoidance(given)
-        self._near = Around(world.around(world.select("ugv")), world.around(world.select("uav")))
+        self.near = Around(world.around(world.select("ugv")), world.around(world.select("uav")))
         zeta = components.threshold(given)
         trigger, noise = components.make_trigger(given, zeta), given.decision
         breaks, places = components.stack_presets(presets)
         scripts = [vertices_of(body) for body in world.moving[r:]]
-        gated, steering = self._gatekeepers is not None, world.steering
-        periods = {loop.PLAN: self._planner.period, **({loop.GATE: given.gatekeeper.period_s} if gated else {})}
+        gated, steering = self.gatekeepers is not None, world.steering
+        periods = {loop.PLAN: self.planner.period, **({loop.GATE: given.gatekeeper.period_s} if gated else {})}
         ticks, due = _schedule(scenario.duration_s, control.period_s, noise.noise_period_s, periods)
         shortest = min(control.period_s, noise.noise_period_s)
-        self._draws = int(scenario.duration_s / noise.noise_period_s) + 2
-        self._team = Team(
-            law=self._law.numbers,
+        self.draws = int(scenario.duration_s / noise.noise_period_s) + 2
+        self.team = Team(
+            law=self.law.numbers,
             layer=self._avoidance.layer,
             uav=np.array([given.uav.altitude_m, control.formation_gain_1_s], dtype=np.float64),
             steering=np.zeros((n, NUMBERS)) if steering is None else steering,
@@ -89,7 +91,7 @@ class Batch:
             script_of=np.cumsum([0, *(len(times) for times, _ in scripts)], dtype=np.int64),
             script_breaks=np.concatenate([np.zeros(0), *(times for times, _ in scripts)]),
             script_holds=np.concatenate([np.zeros((0, 3, 2)), *(_with_end(_holds(*script)) for script in scripts)]),
-            room=room(self._planner.max_speed),
+            room=room(self.planner.max_speed),
             numbers=np.array([
                 control.period_s, SHORT * shortest, 0.01 * ACCURACY * control.period_s,
                 noise.noise_m_sqrt_s / np.sqrt(noise.noise_period_s), noise.leak_1_s, control.sensing_range_m,
@@ -98,22 +100,27 @@ class Batch:
             due=due,
             draws=np.zeros((0, n)),
             gated=gated,
-            remembers=gated and not self._law.intervention_on_top,
+            remembers=gated and not self.law.intervention_on_top,
             watchful=any(body.appears_s > 0.0 or body.disappears_s < np.inf for body in world.bodies),
         )  # fmt: skip
-        self._headings = np.array([
+        self.headings = np.array([
             body.plant.heading_rad if isinstance(body.plant, Unicycle) else 0.0 for body in world.bodies[:n]
         ])  # fmt: skip
-        self._rows = int(1.3 * len(ticks)) + 400
+        self.rows = int(1.3 * len(ticks)) + 400
         sampling_s = [control.period_s, 0.0]
-        self._meta: dict[str, Any] = {
+        self.meta: dict[str, Any] = {
             "zeta_m": float(zeta),
             "controllers": {
-                "ugv_controller": of_ugvs(self._near.ugvs, self._law, r, sampling_s),
-                "uav_controller": read_back(self._near.uav, self._avoidance, r, sampling_s),
+                "ugv_controller": of_ugvs(self.near.ugvs, self.law, r, sampling_s),
+                "uav_controller": read_back(self.near.uav, self._avoidance, r, sampling_s),
             },
             "decision_block": "",
         }
+
+    @property
+    def database(self) -> BehaviourDatabase:
+        """The policies."""
+        return self.planner.database
 
     def simulate(self, seed: int | None = None) -> Trace:
         """The trace of the run with a seed, by default the scenario's.
@@ -122,108 +129,34 @@ class Batch:
             SimulationError: if planner or gatekeeper stop the run; names it and the time.
             LeftToDrakeError: if the run ends in another error.
         """
-        started, seed = time.perf_counter(), self._scenario.seed if seed is None else seed
+        started = time.perf_counter()
         try:
-            log, memory, state = self._simulated(seed)
+            run = self.begin(seed)
+            run.advance(self.scenario.duration_s)
         finally:
-            self._planner.database.close()
-        logged = {
-            "bodies": log.bodies, "team_command": log.command, "reference": log.reference, "noise": log.noise,
-            "decision_variable": log.x, "status": log.status, "executing": log.executing,
-        }  # fmt: skip
-        if self._team.turns:
-            logged |= {"plant_signals": log.signals, "command_share": log.share}
-        done = Done(
-            t=log.t,
-            logged={name: rows.T for name, rows in logged.items()},
-            memory=memory,
-            decided=state.made,
-            seed=seed,
-            until_s=self._scenario.duration_s,
-            wall_s=time.perf_counter() - started,
-            meta=self._meta,
-        )
-        return trace_of(self._scenario, self._name, self._world, done, self._world.signals)
+            self.database.close()
+        return run.trace(time.perf_counter() - started)
 
-    def _simulated(self, seed: int) -> tuple[Log, PlannerState, GatekeeperState]:
-        """The rows of a run, and what planner and gatekeepers remember at its end."""
-        n = len(self._headings)
-        team = self._team._replace(draws=gaussians(seed, n, self._draws))
-        state, log, around = self._start(), self._new_log(self._rows), self._near
-        memory, answering = self._planner.start(), GatekeeperState.empty(n)
-        executed: list[Proposal | None] = [None] * n
-        accepted, first, until = _accepted(executed), True, self._scenario.duration_s
-        while (code := loop.advance(team, around, accepted, state, log, until, first)) != loop.DONE:
-            first = first and code != loop.PYTHON
-            if code == loop.FULL:
-                self._rows *= 2
-                return self._simulated(seed)
-            if code != loop.PYTHON:
-                raise LeftToDrakeError("the run ends in an error")
-            t = float(state.time[0])
-            if team.watchful:
-                around = Around(*(self._world.at(near, t) for near in self._near))
-            try:
-                memory, answering = self._updated(t, state, memory, answering)
-            except (Exception, SystemExit) as error:  # as Drake reports it
-                raise SimulationError(self._name, t, described(error)) from error
-            proposals, answers = memory.proposals, self._answers(memory, answering)
-            state = state._replace(known=answering.sensed) if answering.sensed is not state.known else state
-            state.called[:] = state.status[::FIELDS] == INTERVENING
-            state.time[3] = self._planner.asleep_until(memory, state.called.tolist())
-            state.answers[0] = team.gated and (any(proposals) or any(answers[::2]))
-            now = accepted_proposals(proposals, np.array(answers))
-            if any(one is not other for one, other in zip(now, executed, strict=True)):
-                executed, accepted = now, _accepted(now)
-            state.counts[4] = 1
-        rows = int(state.counts[1])
-        return Log(*(column[:rows] for column in log)), memory, answering
+    def begin(self, seed: int | None = None) -> Going:
+        """A run at its initial state."""
+        return Going(self, self.scenario.seed if seed is None else seed)
 
-    def _updated(
-        self, t: float, state: State, memory: PlannerState, answering: GatekeeperState
-    ) -> tuple[PlannerState, GatekeeperState]:
-        """Planner and gatekeepers after the updates of an instant, which see what both remembered before."""
-        due, places, world = int(state.counts[3]), state.place.copy(), self._world
-        planned, judged = memory, answering
-        if due & loop.PLAN:
-            intervening = (state.status[::FIELDS] == INTERVENING).tolist()
-            if t >= self._planner.asleep_until(memory, intervening):
-                stands = standing(watched(state.halts, t, places.reshape(-1), self._team.room), t).tolist()
-                answers = np.array(self._answers(memory, answering))
-                planned = self._planner.plan(
-                    memory, t, places[: len(world.robots)], intervening, answers, answering.reports, stands,
-                    sightings(world, t, places),
-                )  # fmt: skip
-                planned = sent_after(memory, planned, t)
-        gate = self._gatekeepers if due & loop.GATE else None
-        if gate is not None and not gate.idle(t, memory.proposals, places, answering):
-            period = float(self._team.numbers[0])
-            headings = loop.headings_at(t, state, self._team.steering, period) if self._team.turns else None
-            velocities = world.velocities(t, state.command.copy())
-            judged = gate.sample(Inputs(t, memory.proposals, places, velocities, self._law, headings), answering)
-        return planned, judged
-
-    def _answers(self, memory: PlannerState, answering: GatekeeperState) -> Sequence[float]:
-        """The answers in force, (2n,); without gatekeepers every proposal is accepted at once."""
-        if self._gatekeepers is not None:
-            return answering.answers
-        return [number for p in memory.proposals for number in ((SILENT, -1.0) if p is None else (ACCEPT, p.number))]
-
-    def _start(self) -> State:
-        n, r, m = len(self._headings), len(self._world.robots), len(self._near.ugvs.still)
-        due = int(self._team.due[0])
+    def start(self) -> State:
+        """The state at the beginning of a run."""
+        n, r, m = len(self.headings), len(self.world.robots), len(self.near.ugvs.still)
+        due = int(self.team.due[0])
         return State(
             time=np.array([0.0, 0.0, 0.0, np.inf]),
             counts=np.array([1, 0, 0, due, 0], dtype=np.int64),
             called=np.zeros(n, dtype=np.bool_),
             answers=np.zeros(1, dtype=np.bool_),
-            place=self._world.starts.copy(),
+            place=self.world.starts.copy(),
             noise=np.zeros(n),
             drawn=np.zeros(n),
             command=np.zeros((r, 3)),
             executing=np.full(n, NOTHING),
             share=np.ones(n),
-            heading=self._headings.copy(),
+            heading=self.headings.copy(),
             sampled=np.zeros(1),
             status=np.tile(NEW, n),
             halts=np.tile([0.0, 0.0, 0.0, NOT_WATCHED], n),
@@ -233,11 +166,149 @@ class Batch:
             known=np.zeros((0, m), dtype=np.bool_),
         )
 
-    def _new_log(self, rows: int) -> Log:
-        n, r, moving = len(self._headings), len(self._world.robots), len(self._world.moving)
-        signals = loop.SIGNALS * int((self._team.steering[:, 0] > 0.0).sum())
-        widths = 3 * moving, 3 * r, 6 * n, n, n, FIELDS * n, n, signals, n * self._team.turns
+    def new_log(self, rows: int) -> Log:
+        """Room for so many rows."""
+        n, r, moving = len(self.headings), len(self.world.robots), len(self.world.moving)
+        signals = loop.SIGNALS * int((self.team.steering[:, 0] > 0.0).sum())
+        widths = 3 * moving, 3 * r, 6 * n, n, n, FIELDS * n, n, signals, n * self.team.turns
         return Log(np.empty(rows), *(np.empty((rows, width)) for width in widths))
+
+
+class Going:
+    """A run under way; `deepcopy` copies it, and both go on from there. Policies that remember in themselves do not."""
+
+    def __init__(self, batch: Batch, seed: int) -> None:
+        """Begin a run of a scenario that is set up."""
+        n = len(batch.headings)
+        self._batch, self._seed = batch, seed
+        self._team = batch.team._replace(draws=gaussians(seed, n, batch.draws))
+        self._around = batch.near
+        self._state, self._log, self._enter = batch.start(), batch.new_log(batch.rows), loop.BEGIN
+        self._memory, self._answering = batch.planner.start(), GatekeeperState.empty(n)
+        self._executed: list[Proposal | None] = [None] * n
+        self._accepted = _accepted(self._executed)
+        self._ahead: PlannerState | None = None
+        self.advance(0.0)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Arrays that change are copied; all else is shared."""
+        copied = copy.copy(self)
+        copied._state, copied._log = copy.deepcopy((self._state, self._log))
+        return copied
+
+    @property
+    def t(self) -> float:
+        """Time of the run, s."""
+        return float(self._state.time[0])
+
+    def positions(self) -> Array:
+        """Positions of all robots, UAV last, (n + 1, 3), m."""
+        return self._state.place[: len(self._batch.world.robots)].copy()
+
+    def advance(self, until: float) -> None:
+        """Go on to a time, s; the updates of that instant are still to be made.
+
+        Raises:
+            SimulationError: if planner or gatekeeper stop the run; names it and the time.
+            LeftToDrakeError: if the run ends in another error.
+        """
+        while True:
+            code = loop.advance(self._team, self._around, self._accepted, self._state, self._log, until, self._enter)
+            self._enter = loop.AGAIN if code == loop.FULL else loop.GO_ON
+            if code == loop.DONE:
+                return
+            if code == loop.FULL:
+                more = self._batch.new_log(len(self._log.t))
+                self._log = Log(*(np.concatenate(both) for both in zip(self._log, more, strict=True)))
+            elif code == loop.PYTHON:
+                self._update()
+            else:
+                raise LeftToDrakeError("the run ends in an error")
+
+    def plan_ahead(self) -> None:
+        """Plan for this instant, before its updates, which then take this result; the last one counts."""
+        self._ahead = self._planned()
+
+    def trace(self, wall_s: float = 0.0) -> Trace:
+        """The trace of the run until now; `wall_s`: its duration by the clock."""
+        batch, rows = self._batch, int(self._state.counts[1])
+        log = Log(*(column[:rows] for column in self._log))
+        logged = {
+            "bodies": log.bodies, "team_command": log.command, "reference": log.reference, "noise": log.noise,
+            "decision_variable": log.x, "status": log.status, "executing": log.executing,
+        }  # fmt: skip
+        if self._team.turns:
+            logged |= {"plant_signals": log.signals, "command_share": log.share}
+        done = Done(
+            t=log.t,
+            logged={name: rows.T for name, rows in logged.items()},
+            memory=self._memory,
+            decided=self._answering.made,
+            seed=self._seed,
+            until_s=self.t,
+            wall_s=wall_s,
+            meta=batch.meta,
+        )
+        return trace_of(batch.scenario, batch.name, batch.world, done, batch.world.signals)
+
+    def _update(self) -> None:
+        """Make the updates of an instant by planner and gatekeepers, which see what both remembered before."""
+        batch, state, t = self._batch, self._state, self.t
+        if self._team.watchful:
+            self._around = Around(*(batch.world.at(near, t) for near in batch.near))
+        try:
+            ahead, self._ahead = self._ahead, None
+            planned = (self._planned() if ahead is None else ahead) or self._memory
+            answering = self._judged()
+        except (Exception, SystemExit) as error:  # as Drake reports it
+            raise SimulationError(batch.name, t, described(error)) from error
+        if answering.sensed is not self._answering.sensed:
+            self._state = state = state._replace(known=answering.sensed)
+        self._memory, self._answering = planned, answering
+        answers = self._answers()
+        state.called[:] = state.status[::FIELDS] == INTERVENING
+        state.time[3] = batch.planner.asleep_until(planned, state.called.tolist())
+        state.answers[0] = self._team.gated and (any(planned.proposals) or any(answers[::2]))
+        now = accepted_proposals(planned.proposals, np.array(answers))
+        if any(one is not other for one, other in zip(now, self._executed, strict=True)):
+            self._executed, self._accepted = now, _accepted(now)
+        state.counts[4] = 1
+
+    def _planned(self) -> PlannerState | None:
+        """What the planner remembers after planning at this instant; None at another time, or if nothing changes."""
+        batch, state, t, memory = self._batch, self._state, self.t, self._memory
+        intervening = (state.status[::FIELDS] == INTERVENING).tolist()
+        if not state.counts[3] & loop.PLAN or t < batch.planner.asleep_until(memory, intervening):
+            return None
+        places = state.place.copy()
+        stands = standing(watched(state.halts, t, places.reshape(-1), self._team.room), t).tolist()
+        planned = batch.planner.plan(
+            memory, t, places[: len(batch.world.robots)], intervening, np.array(self._answers()),
+            self._answering.reports, stands, sightings(batch.world, t, places),
+        )  # fmt: skip
+        return sent_after(memory, planned, t)
+
+    def _judged(self) -> GatekeeperState:
+        """What the gatekeepers remember after a sample."""
+        batch, state, t, before = self._batch, self._state, self.t, self._answering
+        proposals, places = self._memory.proposals, state.place.copy()
+        gate = batch.gatekeepers if state.counts[3] & loop.GATE else None
+        if gate is None or gate.idle(t, proposals, places, before):
+            return before
+        period = float(self._team.numbers[0])
+        headings = loop.headings_at(t, state, self._team.steering, period) if self._team.turns else None
+        velocities = batch.world.velocities(t, state.command.copy())
+        return gate.sample(Inputs(t, proposals, places, velocities, batch.law, headings), before)
+
+    def _answers(self) -> Sequence[float]:
+        """The answers in force, (2n,); without gatekeepers every proposal is accepted at once."""
+        if self._batch.gatekeepers is not None:
+            return self._answering.answers
+        return [
+            number
+            for proposal in self._memory.proposals
+            for number in ((SILENT, -1.0) if proposal is None else (ACCEPT, proposal.number))
+        ]
 
 
 def _schedule(

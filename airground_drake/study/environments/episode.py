@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import Any, NoReturn, Self
 
 import numpy as np
-from pydrake.systems.analysis import Simulator
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.errors import SimulationError
 from airground_drake.scenario.load import own
 from airground_drake.scenario.schema import Policy, Scenario
+from airground_drake.sim.batch.run import Batch, Going, LeftToDrakeError
+from airground_drake.sim.blocks.ticks import Ticks
 from airground_drake.sim.simulation import Recorder
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.agent import Agent, Proposed
@@ -35,11 +41,50 @@ def with_agent(scenario: Scenario, run: str) -> Scenario:
     )
 
 
+class ByDrake:
+    """A run under way in Drake's Simulator, as `sim.batch.run.Going` is one in the compiled loop."""
+
+    def __init__(self, recorder: Recorder, seed: int) -> None:
+        """Begin a run."""
+        self._recorder, self._seed = recorder, seed
+        self._simulator = recorder.begin(seed)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> NoReturn:
+        """Refuse, and say why."""
+        wanted = "make a second environment and reset it with the same number: its episodes are the same"
+        raise TypeError(f"this episode cannot be copied: its model is a Drake diagram; {wanted}")
+
+    @property
+    def t(self) -> float:
+        """Time of the run, s."""
+        return float(self._simulator.get_context().get_time())
+
+    def positions(self) -> Array:
+        """Positions of all robots, UAV last, (n + 1, 3), m."""
+        model = self._recorder.model
+        port = model.diagram.GetOutputPort("bodies")
+        bodies: Array = port.Eval(model.diagram.GetMyContextFromRoot(self._simulator.get_context()))
+        return bodies.reshape(-1, 3)[: len(model.world.robots)]
+
+    def plan_ahead(self) -> None:
+        """Plan for this instant, before its updates, which then take this result; the last one counts."""
+        planner = self._recorder.model.planner
+        planner.plan_ahead(planner.GetMyContextFromRoot(self._simulator.get_context()))
+
+    def advance(self, until: float) -> None:
+        """Go on to a time, s; the updates of that instant are still to be made."""
+        self._recorder.advance(self._simulator, until)
+
+    def trace(self) -> Trace:
+        """The trace of the run until now."""
+        return self._recorder.trace(self._simulator, self._seed)
+
+
 class Stage:
     """The model of one run, built once, for any number of episodes."""
 
     def __init__(self, scenario: Scenario, run: str) -> None:
-        """Build the model.
+        """Build the model: the compiled loop, or Drake's diagram for what the loop cannot make.
 
         Args:
             scenario: from `with_agent`.
@@ -49,15 +94,27 @@ class Stage:
             PluginError: if it names a policy, route, task or plant that cannot be made.
         """
         self.scenario, self.run = scenario, run
-        self.recorder = Recorder(scenario, run)
-        policies = self.recorder.model.planner.database.policies
-        self.agent: Agent = next(policy for _, policy in policies if isinstance(policy, Agent))
+        self._begin: Callable[[int], Going | ByDrake]
+        try:
+            batch = Batch(scenario, run)
+            self._begin, self.database = batch.begin, batch.database
+        except LeftToDrakeError:
+            recorder = Recorder(scenario, run)
+            self._begin, self.database = partial(ByDrake, recorder), recorder.model.planner.database
+        self.agent: Agent = next(policy for _, policy in self.database.policies if isinstance(policy, Agent))
         self.targets = np.array([robot.target_m for robot in scenario.robots.values()])
         self.ugvs = tuple(scenario.ugvs)
+        self.instant = Ticks(scenario.intervention.period_s, scenario.control.period_s).instant
+
+    def begin(self, seed: int) -> Going | ByDrake:
+        """A run at its initial state."""
+        return self._begin(seed)
 
 
 class Episode:
     """One run in steps; each leads to the next planning instant at which the policy `agent` is asked.
+
+    `copy.deepcopy` copies an episode, for a search over what to propose, unless Drake makes it.
 
     Attributes:
         stage: the model.
@@ -70,7 +127,7 @@ class Episode:
         """Begin a run.
 
         Args:
-            stage: the model; a later episode on it ends this one.
+            stage: the model; with policies that remember in themselves, a later episode on it ends this one.
             seed: of the decision noise; default: the scenario's.
 
         Raises:
@@ -80,21 +137,26 @@ class Episode:
         self.seed = stage.scenario.seed if seed is None else seed
         self.ended = False
         self.away_s = dict.fromkeys(stage.ugvs, 0.0)
-        stage.agent.chosen, stage.agent.requests = {}, {}
-        self._simulator: Simulator = stage.recorder.begin(self.seed)
+        self._chosen: dict[str, Proposed] = {}
+        self._requests: dict[str, Observation] = {}
+        self._run = stage.begin(self.seed)
         self._instant, self._settled_s, self._end = 0, 0.0, stage.scenario.duration_s
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Share the stage, and copy the run; TypeError if Drake makes it."""
+        copied = copy.copy(self)
+        copied._run = copy.deepcopy(self._run, memo)
+        copied.away_s, copied._chosen, copied._requests = {**self.away_s}, {**self._chosen}, {**self._requests}
+        return copied
 
     @property
     def t(self) -> float:
         """Time of the run, s."""
-        return float(self._simulator.get_context().get_time())
+        return self._run.t
 
     def positions(self) -> Array:
         """Positions of all robots, UAV last, (n + 1, 3), m."""
-        model = self.stage.recorder.model
-        port = model.diagram.GetOutputPort("bodies")
-        bodies: Array = port.Eval(model.diagram.GetMyContextFromRoot(self._simulator.get_context()))
-        return bodies.reshape(-1, 3)[: len(self.stage.targets)]
+        return self._run.positions()
 
     def distances_left(self) -> Array:
         """Distances of all robots from their targets, UAV last, (n + 1,), m."""
@@ -110,8 +172,8 @@ class Episode:
         """
         while not self.ended:
             self._ask()
-            if self.stage.agent.requests:
-                return dict(self.stage.agent.requests)
+            if self._requests:
+                return dict(self._requests)
             self._advance()
         return {}
 
@@ -121,37 +183,39 @@ class Episode:
         Raises:
             ValueError: if there is no such request.
         """
-        if robot not in self.stage.agent.requests:
-            raise ValueError(f"no proposal for {robot} is asked for now; asked for: {', '.join(self._asked)}")
-        del self.stage.agent.requests[robot]
-        self.stage.agent.chosen[robot] = proposed
+        if robot not in self._requests:
+            asked = ", ".join(self._requests or ["none"])
+            raise ValueError(f"no proposal for {robot} is asked for now; asked for: {asked}")
+        del self._requests[robot]
+        self._chosen[robot] = proposed
 
     def trace(self) -> Trace:
         """The trace of the run until now; its scenario has this time as its duration."""
-        return self.stage.recorder.trace(self._simulator, self.seed)
-
-    @property
-    def _asked(self) -> list[str]:
-        return list(self.stage.agent.requests) or ["none"]
+        return self._run.trace()
 
     def _ask(self) -> None:
         """Let the planner plan for this instant, to find out what it asks for; the run does not change."""
-        planner = self.stage.recorder.model.planner
-        self.stage.agent.requests = {}
-        planner.plan_ahead(planner.GetMyContextFromRoot(self._simulator.get_context()))
+        agent = self.stage.agent
+        agent.chosen, agent.requests = self._chosen, {}
+        self._run.plan_ahead()
+        self._requests = agent.requests
 
     def _advance(self) -> None:
         """Go to the next planning instant or to the end of the run."""
-        before, planner = self.t, self.stage.recorder.model.planner
+        before = self.t
         self._instant += 1
-        until = planner.instant(self._instant)
+        until = self.stage.instant(self._instant)
         until = self._end if until >= self._end * (1.0 - ROUNDING) else until
-        self.stage.recorder.advance(self._simulator, until)
-        self.stage.agent.chosen, self.stage.agent.requests = {}, {}
+        self.stage.agent.chosen = self._chosen
+        try:
+            self._run.advance(until)
+        except LeftToDrakeError as error:
+            raise SimulationError(self.stage.run, self.t, str(error)) from error
+        self._chosen, self._requests = {}, {}
         away = self.distances_left() > self.stage.scenario.arrival_tolerance_m
         for ugv, far in zip(self.stage.ugvs, away[:-1], strict=True):
             self.away_s[ugv] += (until - before) * float(far)
         self._settled_s = 0.0 if away.any() else self._settled_s + until - before
         self.ended = until >= self._end or self._settled_s >= SETTLED_S
         if self.ended:
-            planner.close()
+            self.stage.database.close()

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Integral
-from typing import Any, NoReturn
+from typing import Any, Self
 
 import numpy as np
 
@@ -106,10 +107,14 @@ class Episodes:
         self._episode: Episode | None = None
         self._over = False
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> NoReturn:
-        """Refuse, and say why."""
-        wanted = "make a second environment and reset it with the same number: its episodes are the same"
-        raise TypeError(f"{type(self).__name__} cannot be copied: its model is a Drake diagram; {wanted}")
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Share where episodes come from, and copy the rest, as the present episode; TypeError if Drake makes it."""
+        copied = copy.copy(self)
+        memo[id(self)] = copied
+        for name, value in vars(self).items():
+            if name not in ("_source", "encoding"):
+                setattr(copied, name, copy.deepcopy(value, memo))
+        return copied
 
     def trace(self) -> Trace:
         """What the episode has recorded until now, for `judge`.

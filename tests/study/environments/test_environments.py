@@ -296,7 +296,7 @@ def test_mistakes_are_named() -> None:
 
 @pytest.mark.parametrize("kind", [InterventionEnv, TeamEnv])
 def test_mistakes_in_an_episode_are_named(kind: type[InterventionEnv] | type[TeamEnv]) -> None:
-    """Both kinds: options that do not exist, steps after the end, copies."""
+    """Both kinds: options that do not exist, steps after the end."""
     env = kind(load("minimal", {"duration_s": 0.5}))
     with pytest.raises(ValueError, match="unknown options of reset: 'nmber'; allowed: 'number'"):
         env.reset(options={"nmber": 3})
@@ -305,12 +305,40 @@ def test_mistakes_in_an_episode_are_named(kind: type[InterventionEnv] | type[Tea
     assert env.step(action)[2] in (True, {"ugv1": True})
     with pytest.raises(RuntimeError, match="the episode is over: call reset"):
         env.step(action)
-    with pytest.raises(
-        TypeError, match=f"{kind.__name__} cannot be copied: its model is a Drake diagram; make a second"
-    ):
-        copy.deepcopy(env)
     env.reset(options={"number": 1})
     env.step(action)
+
+
+@pytest.mark.parametrize("kind", [InterventionEnv, TeamEnv])
+def test_an_environment_goes_on_as_its_copy_does(kind: type[InterventionEnv] | type[TeamEnv]) -> None:
+    """The copy comes first, and proposes something else in between: neither notices the other."""
+    env = kind(load("case_b", {"duration_s": 16.0}))
+    env.reset(options={"number": 4})
+    rng = np.random.default_rng(1)
+    actions = [rng.uniform(-1.0, 1.0, 5) for _ in range(6)]
+
+    def go_on(own: Any, chosen: Sequence[Any]) -> list[Any]:
+        steps = []
+        for action in chosen:
+            step = own.step(dict.fromkeys(own.agents, action) if isinstance(own, TeamEnv) else action)
+            steps.append(step[:3])
+            if step[2] in (True, dict.fromkeys(step[2], True) if isinstance(step[2], dict) else True):
+                break
+        return steps
+
+    go_on(env, actions[:1])
+    copied, other = copy.deepcopy(env), copy.deepcopy(env)
+    go_on(other, actions[::-1])
+    theirs, ours = go_on(copied, actions[1:]), go_on(env, actions[1:])
+    assert str(theirs) == str(ours)
+    assert same(copied.trace(), env.trace())
+
+
+def test_an_episode_that_drake_makes_is_not_copied() -> None:
+    env = InterventionEnv(load("lagging", {"duration_s": 2.0}))
+    env.reset(options={"number": 1})
+    with pytest.raises(TypeError, match="its model is a Drake diagram; make a second environment"):
+        copy.deepcopy(env)
 
 
 def test_an_action_that_is_missing_is_named() -> None:
