@@ -58,11 +58,11 @@ class Run:
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
         """Lower bound of the distance of each pair, m, so that only near pairs are looked at closely."""
-        box, found = {name: boxes_of(place) for name, place in self.body_m.items()}, {}
+        box, bounds_m = {name: boxes_of(place) for name, place in self.body_m.items()}, {}
         for pair in self.pairs:
             (low, high), (other_low, other_high) = box[pair.robot], box[pair.other]
-            found[pair.robot, pair.other] = float(pair.shape.bounds_m(low - other_high, high - other_low).min())
-        return found
+            bounds_m[pair.robot, pair.other] = float(pair.shape.bounds_m(low - other_high, high - other_low).min())
+        return bounds_m
 
     @cached_property
     def presets(self) -> dict[str, Preset]:
@@ -173,8 +173,8 @@ class Run:
 
     def times_s(self, robot: str, kind: str) -> Array:
         """Times of the recorded events of a kind, increasing."""
-        found = [float(event["t_s"]) for event in self.events if (event["robot"], event["kind"]) == (robot, kind)]
-        return np.array(sorted(found))
+        times_s = [float(event["t_s"]) for event in self.events if (event["robot"], event["kind"]) == (robot, kind)]
+        return np.array(sorted(times_s))
 
 
 def column_of(table: pd.DataFrame, name: str) -> Array:

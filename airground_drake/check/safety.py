@@ -47,19 +47,19 @@ def safe_trace(run: Run) -> Found:
 def _least_m(run: Run, pair: Pair, enough: float) -> float:
     """The least distance of a pair, m, at most `enough`; where bodies bend too near, their ways are divided."""
     apart, bent = run.apart(pair), run.bent_m(pair)
-    found = pair.shape.least_m(apart, enough + bent) - bent
-    if not bent or found >= pair.safe_m:
-        return min(found, enough)
+    least_m = pair.shape.least_m(apart, enough + bent) - bent
+    if not bent or least_m >= pair.safe_m:
+        return min(least_m, enough)
     lower = pair.shape.held_m(apart[:-1], apart[:-1], apart[1:], enough + bent)[1] - bent
     too_near = lower < pair.safe_m
     parts = _parts(bent)
     left = bent / parts**2
-    found = min(enough, float(lower[~too_near].min(initial=np.inf)))
+    least_m = min(enough, float(lower[~too_near].min(initial=np.inf)))
     begin = run.there(pair.other).start
-    for k in (each for each in np.argsort(lower).tolist() if too_near[each]):  # others are farther than the nearest
+    for k in (step for step in np.argsort(lower).tolist() if too_near[step]):  # others are farther than the nearest
         fine = run.fine(pair.robot, begin + k, parts) - run.fine(pair.other, begin + k, parts)
-        found = min(found, pair.shape.least_m(fine, found + left, parts) - left)
-    return found
+        least_m = min(least_m, pair.shape.least_m(fine, least_m + left, parts) - left)
+    return least_m
 
 
 def _parts(bent_m: float) -> int:
@@ -164,8 +164,8 @@ def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: 
     # last: length of the last period, in periods; its step is extended to a whole one.
     periods = len(own_m) - 1
     lasts = [Fraction(1)] * (periods - 1) + [last]
-    found = shortfalls_m(own_m, other_m, pair, [pair.safe_m] * periods, [gain] * periods, lasts)
-    return max((each.both for each in found.values()), default=Fraction())
+    missed = shortfalls_m(own_m, other_m, pair, [pair.safe_m] * periods, [gain] * periods, lasts)
+    return max((shortfall.both for shortfall in missed.values()), default=Fraction())
 
 
 def shortfalls_m(
@@ -179,9 +179,9 @@ def shortfalls_m(
     # lasts: divisors of the steps of each period, (K,); by default 1.
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
     lasts = lasts or [Fraction(1)] * len(reach)
-    reach /= np.array([float(each) for each in lasts])
+    reach /= np.array([float(last) for last in lasts])
     enough = reach + np.asarray(safe_m) + FAR_M
-    share, found = Fraction(pair.share), dict[int, Shortfall]()
+    share, shortfalls = Fraction(pair.share), dict[int, Shortfall]()
     apart = own_m[:-1] - other_m[:-1]
     for bound, part, rows in pair.shape.near(apart):
         if bound >= enough.max():
@@ -196,13 +196,13 @@ def shortfalls_m(
                 (Fraction(safe_m[k]), share, gain[k], len(part.corners) == 1),
                 [a - b for a, b in zip(after, here, strict=True)],
             )
-            own, other = min(_missed_m(away, [each / lasts[k] for each in step], *given) for away in ways), Fraction()
+            own, other = min(_missed_m(away, [axis / lasts[k] for axis in step], *given) for away in ways), Fraction()
             if pair.share < 1.0:  # a robot is a point: there is one way
                 step = [(a - b) / lasts[k] for a, b in zip(beyond, there, strict=True)]
                 other = _missed_m(Away([-c for c in ways[0].vector], ways[0].beyond), step, *given)
-            if own + other > (found[k].both if k in found else 0):
-                found[k] = Shortfall(own, other)
-    return found
+            if own + other > (shortfalls[k].both if k in shortfalls else 0):
+                shortfalls[k] = Shortfall(own, other)
+    return shortfalls
 
 
 def lost_m(missed: Fraction, gain: Fraction, samples: int) -> float:
@@ -240,11 +240,11 @@ def safe_hyp(run: Run) -> Found:
 
 def _constants(run: Run) -> None:
     """A h <= 1, each pair without the passive law starts apart, and the sensing range covers d + (closing speed) h."""
-    control, limit = run.scenario["control"], {name: each["max_speed_m_s"] for name, each in run.robots.items()}
+    control, limit = run.scenario["control"], {name: robot["max_speed_m_s"] for name, robot in run.robots.items()}
     period, reach = written(control["period_s"]), written(control["sensing_range_m"])
     gain = written(control["avoidance_gain_1_s"]) * period
     holds("gain: A h <= 1", gain <= 1, float(gain), "1 at most")
-    for pair in (each.in_the_law for each in run.pairs):
+    for pair in (pair.in_the_law for pair in run.pairs):
         about = f"{pair.robot}, {pair.other}"
         speed = written(limit[pair.robot]) + written(limit.get(pair.other, pair.moves_m_s))
         least = written(pair.safe_m) + speed * period
@@ -296,8 +296,8 @@ def _motion(run: Run) -> None:
             holds("least turning radius", spare >= -SMALL, spare, "0 m at least to spare", about=robot)
         if own := own_of(spec):
             for key, unit in (("drift_m_s", "m/s"), ("cover_m", "m")):
-                found, about = column_of(run.samples, f"{robot}.{key}"), f"{own[key]} {unit} at most"
-                holds(f"declared {key}", found <= own[key] + SMALL, found, about, about=robot, t_s=run.sample_s)
+                speeds, about = column_of(run.samples, f"{robot}.{key}"), f"{own[key]} {unit} at most"
+                holds(f"declared {key}", speeds <= own[key] + SMALL, speeds, about, about=robot, t_s=run.sample_s)
         speed = np.linalg.norm(run.sampled(robot, "v", "m_s"), axis=1)
         slow, most = speed <= spec["max_speed_m_s"] + SMALL, f"{spec['max_speed_m_s']} at most"
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)
