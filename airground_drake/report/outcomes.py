@@ -61,7 +61,7 @@ def pairs(run: Run) -> Iterator[Near]:
 
 def named(body: str, at_m: Sequence[float] | None = None) -> str:
     """The name of a body in words; of the map, which is everywhere, with the place that is meant, m."""
-    return f"the map at ({', '.join(f'{each + 0.0:.2f}' for each in at_m)})" if at_m else body
+    return f"the map at ({', '.join(f'{axis + 0.0:.2f}' for axis in at_m)})" if at_m else body
 
 
 def distance(value_m: float, required_m: float) -> str:

@@ -104,8 +104,8 @@ def _headline(rows: Sequence[Row]) -> list[Line]:
     told = []
     for row, among in ((main[0], main), *[(rest[-1], rest) for _ in rest[:1]]):
         mark, says = row.clause
-        alike = [each for each in among if each.clause == row.clause]
-        told.append(Line(mark, f"{_who(alike)} ({', '.join(each.run for each in alike)}): {says}."))
+        alike = [other for other in among if other.clause == row.clause]
+        told.append(Line(mark, f"{_who(alike)} ({', '.join(other.run for other in alike)}): {says}."))
     return told
 
 
@@ -115,7 +115,7 @@ def _who(alike: Sequence[Row]) -> str:
 
 
 def _rows(report: Report) -> list[Row]:
-    found = []
+    rows = []
     for name, spec in report.scenario.resolved.runs.items():
         row = Row(name, _says(spec), spec.composition == "augmented")
         if name in report.runs:
@@ -124,8 +124,8 @@ def _rows(report: Report) -> list[Row]:
             row.kept, row.what = rule.kept, _what(run)
             row.safe, row.arrived, row.uav = _safe(run, rule), _arrived(run), _uav(run)
             row.bad_seeds = sum(seed.run == name and not seed.kept for seed in report.seeds)
-        found.append(row)
-    return found
+        rows.append(row)
+    return rows
 
 
 def _says(spec: Run) -> str:
@@ -137,9 +137,9 @@ def _says(spec: Run) -> str:
 
 def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
     judged = run.claim(rules.DISTANCES)
-    faster = [f"{each} was faster than declared" for each in run.faster]
+    faster = [f"{mover} was faster than declared" for mover in run.faster]
     if rule.kept:
-        near = [each.line for each in run.approaches() if not each.is_short]
+        near = [near_body.line for near_body in run.approaches() if not near_body.is_short]
         return Cell(rule.mark, [rule.words, *(near[:MOST_NAMES] or ["nobody else is there"]), *faster])
     if rule.mark == "open":
         return Cell(
@@ -150,7 +150,7 @@ def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
     lines += [counted(len(run.breaches) - 1, "more collision")] * (run.collided and len(run.breaches) > 1)
     lines += [f"{counted(run.others_too_close, 'more pair')} too close"] * (run.others_too_close > 0)
     lines += [run.whose] * bool(run.whose) + faster
-    lines += [f"{each} is not on the UAV's map" for each in run.unmapped[:MOST_NAMES]]
+    lines += [f"{body} is not on the UAV's map" for body in run.unmapped[:MOST_NAMES]]
     return Cell(rule.mark, lines + ["contradicts its proof: please report"] * run.contradicts_its_proof)
 
 
@@ -222,7 +222,7 @@ def _seeds(report: Report) -> Iterator[Check]:
         if kept < count:
             worst = min((seed for name in names for seed in of_runs[name]), key=lambda seed: Near.of(seed).margin_m)
             yield Check("Other seeds?", "", f"the worst: {Near.of(worst).line}, run {worst.run}, seed {worst.seed}")
-    if of_runs and not any(each > 0.0 for each in noise):
+    if of_runs and not any(level > 0.0 for level in noise):
         yield Check("Other seeds?", "none", "without decision noise a seed changes nothing")
 
 
@@ -262,17 +262,17 @@ def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
         if run
     )
     for (zeta, rule), runs in of.items():
-        exact, timing = ([run.claim(each) for run in runs] for each in (rules.CROSSINGS, rules.TIMING))
-        found = [claim.evidence for claim in timing if "counts" in claim.evidence]
+        exact, timing = ([run.claim(rule) for run in runs] for rule in (rules.CROSSINGS, rules.TIMING))
+        timed = [claim.evidence for claim in timing if "counts" in claim.evidence]
         mark, fired = _verdict([*exact, *timing]), sum(run.triggers for run in runs)
         says = [f"{counted(fired, 'trigger')} at {zeta:.3g} m ({rules.THRESHOLDS.get(rule, rule)})"]
         if not fired:
             most = [ugv["largest_decision_variable_m"] for claim in exact for ugv in claim.evidence.get("ugvs", ())]
             says += [f"{value:.3g} m reached" for value in sorted(most)[-1:]]
             mark = "none" if mark == "yes" else mark
-        says += [f"{sum(each['counts'][kind] for each in found)} {kind}" for kind in ("false", "missed") if found]
-        off_s = [abs(each[kind]["late_s"]) for each in found for kind in ("latest", "earliest") if each[kind]]
-        says += [f"at most {max(off_s, default=0.0):.2f} s off"] * bool(found and fired)
+        says += [f"{sum(entry['counts'][kind] for entry in timed)} {kind}" for kind in ("false", "missed") if timed]
+        off_s = [abs(entry[kind]["late_s"]) for entry in timed for kind in ("latest", "earliest") if entry[kind]]
+        says += [f"at most {max(off_s, default=0.0):.2f} s off"] * bool(timed and fired)
         above = list(dict.fromkeys(ugv for run in runs for ugv in run.run.metrics.above_at_start))
         says += [f"{_named(above)} above it from the start"] * bool(above)
         wrong = [run.name for run, claim in zip(runs, exact, strict=True) if claim.status == "refuted"]
@@ -317,10 +317,10 @@ def _beware(report: Report, rows: Sequence[Row]) -> list[str]:
 
 def _real(report: Report) -> str:
     """That real robots and other starts may differ; with what a user's plant showed of what it declares."""
-    own = [each for claim in report.about(rules.CONDITIONS) for each in claim.evidence.get("own_plants", ())]
+    own = [plant for claim in report.about(rules.CONDITIONS) for plant in claim.evidence.get("own_plants", ())]
     if not own:
         return "other starts or real robots end so, too: arrival is only seen, and sensing is perfect here"
-    most = max(own, key=lambda each: float(each["cover_m"]))
+    most = max(own, key=lambda plant: float(plant["cover_m"]))
     return (
         "other starts or real robots end so, too: {robot} showed {drift_m_s:.2g} of {declared_drift_m_s:.3g} m/s drift "
         "and {cover_m:.3g} of {declared_cover_m:.3g} m cover here"
@@ -335,8 +335,8 @@ def declared(report: Report) -> Cell:
     told[0] += f" (failures among them: {refuted})" * bool(refuted)
     wrong = [*overall.differs, *overall.undecided, *overall.missing]
     subjects = {claim.id: claim.subject for claim in report.claims}
-    names = [f"{each.run or 'model'}: {subjects.get(each.id) or each.id or 'run'} "
-             f"{rules.CAME_OUT.get(each.status, each.status)}" for each in wrong]  # fmt: skip
+    names = [f"{claim.run or 'model'}: {subjects.get(claim.id) or claim.id or 'run'} "
+             f"{rules.CAME_OUT.get(claim.status, claim.status)}" for claim in wrong]  # fmt: skip
     names += [f"finding {number} about the paper not demonstrated" for number in overall.undemonstrated]
     told += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' * (len(names) > 3)}"] * bool(names)
     more = len(overall.unpromised)

@@ -27,12 +27,12 @@ HELD_M_S = AT_REST_M / AT_REST_S
 def stalls(trace: Trace) -> list[dict[str, Any]]:
     """Where UGVs stood for `AT_REST_S` or longer short of their targets, by time; before a UGV's first collision."""
     # Nobody holds a UGV that waits as its proposal asks.
-    found = list[dict[str, Any]]()
+    waits = list[dict[str, Any]]()
     for ugv in trace.ugvs:
         if standing := _standing(trace, ugv):
             given = inequalities_of(trace, ugv)
-            found += [_stall(trace, ugv, first, last, given) for first, last in standing]
-    return sorted(found, key=lambda stall: float(stall["from_s"]))
+            waits += [_stall(trace, ugv, first, last, given) for first, last in standing]
+    return sorted(waits, key=lambda stall: float(stall["from_s"]))
 
 
 def _standing(trace: Trace, ugv: str) -> list[tuple[int, int]]:

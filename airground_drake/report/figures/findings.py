@@ -141,7 +141,7 @@ def one_or_two(item: Mapping[str, Any]) -> Chart:
 
 
 def _curve(value: Callable[[float], float], x: Array) -> tuple[Array, Array]:
-    return x, np.array([value(each) for each in x])
+    return x, np.array([value(point) for point in x])
 
 
 # By number of the finding. Those of 1 are drawn from runs; those of 2 and 9 are charts of claims.

@@ -55,18 +55,18 @@ def distances(
 ) -> Figure:
     """Distances between the surfaces of each UGV and bodies near it, the required ones, and the exact minimum."""
     figure, every = _time_axes(1.45, [0.24, *[0.32] * (len(near) - 1)], trace)
-    required = sorted({found.required_m for each in near.values() for found in each})
+    required = sorted({at.required_m for those in near.values() for at in those})
     for axes, (ugv, those) in zip(every, near.items(), strict=True):
-        bottom = min(0.0, *(found.value_m for found in those)) if those else 0.0
+        bottom = min(0.0, *(at.value_m for at in those)) if those else 0.0
         axes.axhspan(bottom, required[0], **_FORBIDDEN)
         labels = [(d, f"required {d:.3g}", INK) for d in required]
         for d in required:
             level(axes, d, "-")
         highest = required[-1]
-        for found in those:
-            gap, appearance = gap_m(trace, ugv, found.other), look(looks[ugv][found.other])
+        for at in those:
+            gap, appearance = gap_m(trace, ugv, at.other), look(looks[ugv][at.other])
             time_line(axes, trace.t, gap, appearance)
-            labels.append((min(float(gap[-1]), top), short(found.other, 12), appearance.color))
+            labels.append((min(float(gap[-1]), top), short(at.other, 12), appearance.color))
             highest = max(highest, float(np.nanmax(gap)))
         axes.set_ylim(bottom, min(1.05 * highest, top))
         rule(axes, "time, s" if axes is every[-1] else "", "distance, m")
@@ -106,8 +106,8 @@ class _Label(NamedTuple):
 def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
     """Decision variables of UGVs and what happened, a row each, without the time in which nothing happened."""
     happened = {ugv: events_of(trace, ugv, *MARKS) for ugv in ugvs}
-    clock = Clock.around([event["t_s"] for each in happened.values() for event in each], *_ends_s(trace))
-    labels = {ugv: _labels(each, clock) for ugv, each in happened.items()}
+    clock = Clock.around([event["t_s"] for those in happened.values() for event in those], *_ends_s(trace))
+    labels = {ugv: _labels(those, clock) for ugv, those in happened.items()}
     heads = [short(ugv) if labels[ugv] else fill(f"{short(ugv)}: {told(trace, ugv)}", TOLD_CHARS) for ugv in ugvs]
     lines = [max((label.top for label in labels[ugv]), default=0) for ugv in ugvs]
     above_in = [_LINE_IN * (line + head.count("\n") + 1) + 0.14 for line, head in zip(lines, heads, strict=True)]
@@ -186,7 +186,7 @@ def _labels(happened: Sequence[Mapping[str, Any]], clock: Clock) -> list[_Label]
         width = s_per_in * _CHAR_IN * max(map(len, text.split("\n")))
         at = float(clock.at([group[0]["t_s"]])[0])
         begin = max(min(at, clock.length + s_per_in * _RIGHT_IN - width), -s_per_in * _LEFT_IN)
-        over = [one.top for one in labels if one.begin < begin + width and begin < one.end]
+        over = [label.top for label in labels if label.begin < begin + width and begin < label.end]
         color = next((_COLORS[event["kind"]] for event in group if event["kind"] in ("refuse", "accept")), INK)
         labels.append(_Label(at, begin, begin + width, max(over, default=0), text, color))
     return labels
@@ -198,13 +198,13 @@ def _word(kind: str, t_s: float) -> str:
 
 def told(trace: Trace, ugv: str) -> str:
     """The events of a UGV with their times; many events are counted by kind; without any, its largest value."""
-    found = events_of(trace, ugv, *MARKS)
-    if not found:
+    marks = events_of(trace, ugv, *MARKS)
+    if not marks:
         x = trace.column(f"{ugv}.decision_variable_m")
         return f"nothing happens; largest {x.max():.3g} m at {trace.t[x.argmax()]:.2f} s"
-    if len(found) <= MAX_TOLD:
-        return f"{', '.join(_word(event['kind'], event['t_s']) for event in found)} s"
-    times = {kind: [event["t_s"] for event in found if event["kind"] == kind] for kind in MARKS}
+    if len(marks) <= MAX_TOLD:
+        return f"{', '.join(_word(event['kind'], event['t_s']) for event in marks)} s"
+    times = {kind: [event["t_s"] for event in marks if event["kind"] == kind] for kind in MARKS}
     counts = (f"{len(t)} \N{MULTIPLICATION SIGN} " * (len(t) > 1) + _word(kind, t[0]) for kind, t in times.items() if t)
     return f"{', '.join(counts)} s (first times)"
 
