@@ -70,7 +70,7 @@ def _of_another_kind(source: str, key: str, kind: str, kinds: dict[str, list[str
 
 def _as_written(data: Any, at: list[str]) -> list[str]:
     """The way to a value without what pydantic adds: the number 0 of a mapping that stands for a list, and kinds."""
-    found = list[str]()
+    written = list[str]()
     for k, part in enumerate(at):
         if isinstance(data, dict):
             if part not in data and k < len(at) - 1:
@@ -78,5 +78,5 @@ def _as_written(data: Any, at: list[str]) -> list[str]:
             data = data.get(part)
         elif isinstance(data, list):
             data = data[int(part)] if part.isdecimal() and int(part) < len(data) else None
-        found.append(part)
-    return found
+        written.append(part)
+    return written

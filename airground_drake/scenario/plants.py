@@ -51,10 +51,10 @@ class _Robot(Protocol):
 
 def plant_of(robot: _Robot, period_s: float) -> Plant:
     """How a robot moves under its commands, with a control period, s."""
-    found: Plant | None = None
+    plant: Plant | None = None
     for keys in reversed(robot.plant):
-        found = keys.made(period_s, found)
-    return found or FirstOrder()
+        plant = keys.made(period_s, plant)
+    return plant or FirstOrder()
 
 
 def made(given: list[dict[str, Any]], period_s: float) -> Plant:
