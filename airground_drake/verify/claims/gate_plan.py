@@ -166,7 +166,7 @@ class GatePlan(GateClaim):
             plans_with_slack=sum(value > 0.0 for value in slack),
             rounded_plans=len(rounded),
             largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
-            largest_gaps=[{"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap} for each in bounded[:5]],
+            largest_gaps=[{"t_s": row.row.t_s, "robot": row.row.robot, "gap": row.gap} for row in bounded[:5]],
             median_gap=float(np.median([decision.gap for decision in bounded])) if bounded else None,
             widest_enclosure=widest,
             first_stage_certified=sum(decision.first_stage_certified for decision in bounded),

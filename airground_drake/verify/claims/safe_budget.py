@@ -80,10 +80,10 @@ class SafeBudget(TheoremClaim):
             },
             "pairs": [
                 {
-                    "first": one.first, "second": one.second, "kind": one.kind, "law_m": one.law_m,
-                    "safe_m": one.promised_m + one.radii_m,
+                    "first": pair.first, "second": pair.second, "kind": pair.kind, "law_m": pair.law_m,
+                    "safe_m": pair.promised_m + pair.radii_m,
                 }
-                for one in (group[0] for group in alike(budget(scenario))) if one.terms
+                for pair in (group[0] for group in alike(budget(scenario))) if pair.terms
             ],
         }  # fmt: skip
 

@@ -208,24 +208,24 @@ class SafeHyp(TraceClaim):
 
 def _against(trace: Trace, first: dict[str, Any], broken: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The hypothesis broken first, with what is needed to redo it by hand."""
-    found = first | snapshot(trace, map(str, first.values()), first["t_s"])
+    against = first | snapshot(trace, map(str, first.values()), first["t_s"])
     if first["hypothesis"] != DECLARED:
-        return found
+        return against
     declared = trace.scenario.barriers[first["other"]].expected_speed_m_s
     told = f"{first['other']} moved at {declared - first['margin']:.2f} m/s at {first['t_s']:.2f} s"
     more = sorted({str(entry["hypothesis"]) for entry in broken} - {DECLARED})
-    return found | {"why": f"{told}, declared {declared:.2f}", "also_broken": more}
+    return against | {"why": f"{told}, declared {declared:.2f}", "also_broken": more}
 
 
 def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
     """Where each hypothesis has its least margin, for each robot or pair that it is about."""
-    found: dict[tuple[str, str], dict[str, Any]] = {}
+    least: dict[tuple[str, str], dict[str, Any]] = {}
     for h in hypotheses:
         entry = h.at(int(np.argmin(h.margin)))
         key = h.name, str(next(iter(h.about.values()), ""))
-        if entry["margin"] <= found.get(key, entry)["margin"]:
-            found[key] = entry
-    return list(found.values())
+        if entry["margin"] <= least.get(key, entry)["margin"]:
+            least[key] = entry
+    return list(least.values())
 
 
 def _shown(
@@ -443,13 +443,13 @@ class OwnPlant:
 
 def own_plants(trace: Trace) -> list[OwnPlant]:
     """All robots with users' plants."""
-    found = []
+    plants = []
     for name, robot in trace.scenario.robots.items():
         if measured := trace.plant(name).measured:
             drift, cover = (float(trace.sampled(f"{name}.{key}").max()) for key in measured)
             bounds, (keys,) = bounds_of(trace)[name], robot.plant
-            found.append(OwnPlant(name, keys.kind, drift, bounds.drift_m_s, cover, bounds.cover_m))
-    return found
+            plants.append(OwnPlant(name, keys.kind, drift, bounds.drift_m_s, cover, bounds.cover_m))
+    return plants
 
 
 def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:

@@ -57,10 +57,10 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     bodies = np.unique(parts.owner[moving], return_inverse=True)[1]
     carrier = np.concatenate([everybody, len(robots) + bodies])
     with_uav = np.array([name == scenario.uav.name for name in robots])
-    found = {}
+    wanted = {}
     for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
         beside = np.array([np.delete(np.arange(len(column)), m + i) for i in team])
-        found[name] = {
+        wanted[name] = {
             "members": team,
             "outlines": at_rest,
             "others": carrier[beside[:, m:] - m].ravel(),
@@ -74,12 +74,12 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             "sensing_range_m": control.sensing_range_m,
         }
         if len(moving):
-            found[name]["moving_outlines"] = that_move
+            wanted[name]["moving_outlines"] = that_move
     of_run = scenario.runs[trace.run]
-    found["ugv_controller"]["composition"] = of_run.composition
+    wanted["ugv_controller"]["composition"] = of_run.composition
     if of_run.method != NO_INTERVENTION:
-        found["ugv_controller"]["intervention_on_top"] = of_run.method in ON_TOP
-    return found
+        wanted["ugv_controller"]["intervention_on_top"] = of_run.method in ON_TOP
+    return wanted
 
 
 def _numbers(trace: Trace) -> tuple[Indices, Indices]:
@@ -105,12 +105,12 @@ def _without_circles(numbers: Sequence[float]) -> Array:
         rows = unpacked(numbers)
     except ValueError:
         return np.array(numbers)
-    found = [np.empty(0)]
+    kept = [np.empty(0)]
     for row in rows:
         corners = row[CORNERS : CORNERS + 2 * int(row[COUNT])]
         held = np.hypot(*(corners.reshape(-1, 2) - row[MIDDLE:EXTENT]).T).max() <= row[EXTENT]
-        found.append(np.where(held, np.append(row[:MIDDLE], corners), np.nan))
-    return np.concatenate(found)
+        kept.append(np.where(held, np.append(row[:MIDDLE], corners), np.nan))
+    return np.concatenate(kept)
 
 
 def differences(trace: Trace) -> Iterator[dict[str, Any]]:

@@ -294,9 +294,9 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     beside = cores.take((slice(None), None))
     lower = least_distances(beside, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
     most, t = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS), trace.t[pair.rows]
-    found = list[Approach]()
+    approaches = list[Approach]()
     for k in sorted(np.flatnonzero(lower < pair.safe_m).tolist(), key=lower.__getitem__):
-        best = min(found).distance_m if found else inf
+        best = min(approaches).distance_m if approaches else inf
         if lower[k] > best:
             break
         for parts in (min(FEW_PARTS, most), most):  # few tell of most segments that the least distance is elsewhere
@@ -312,12 +312,12 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
             if nearest.distance_m > best:
                 break
         else:
-            found.append(nearest)
+            approaches.append(nearest)
     rest = np.delete(lower, np.flatnonzero(lower < pair.safe_m))
     if len(rest):
         k = int(np.flatnonzero(lower == rest.min())[0])
-        found.append(Approach(float(rest.min()), float(t[k]), k + 1))
-    return min(found)
+        approaches.append(Approach(float(rest.min()), float(t[k]), k + 1))
+    return min(approaches)
 
 
 def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:

@@ -119,13 +119,13 @@ def beside(trace: Trace) -> list[Periods]:
 
 def speeds(trace: Trace) -> dict[str, Array]:
     """Mean speeds of the obstacles that move during the control periods, (K,), m/s, by name; 0 while not there."""
-    ends, found = period_ends(trace), dict[str, Array]()
+    ends, mean = period_ends(trace), dict[str, Array]()
     for name, barrier in trace.scenario.barriers.items():
         if barrier.moves:
             speed = np.linalg.norm(np.diff(trace.position(name)[ends], axis=0), axis=1) / np.diff(trace.t[ends])
             there = (ends[:-1] >= trace.there_from(name)) & (ends[:-1] < trace.there_until(name))
-            found[name] = np.where(there, speed, 0.0)
-    return found
+            mean[name] = np.where(there, speed, 0.0)
+    return mean
 
 
 @dataclass(frozen=True)

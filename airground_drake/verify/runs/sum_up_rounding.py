@@ -15,10 +15,10 @@ ROUNDED_ROUTES = ("relaxed", "nonlinear")  # routes that solve (27) and round by
 
 def is_rounded(row: DecisionRecord) -> bool:
     """Whether a relaxed plan or a rounded one was recorded; each needs the other."""
-    found = row.data["relaxed"] is not None or row.data["rounded"] is not None
-    if not found and row.given["route"] in ROUNDED_ROUTES and row.given["status"] == "optimal":
+    rounded = row.data["relaxed"] is not None or row.data["rounded"] is not None
+    if not rounded and row.given["route"] in ROUNDED_ROUTES and row.given["status"] == "optimal":
         raise TraceError(f"{row.label} claims to be complete, but has no relaxation")
-    return found
+    return rounded
 
 
 def integrated_error_s(row: DecisionRecord) -> float:

@@ -86,10 +86,10 @@ def transitions(x: NormSignal, zeta: float, release: float, dwell: float) -> Ite
         if trigger is None:
             return
         yield trigger, "trigger"
-        found = x.reaches(release, trigger, above=False)
-        if found is None:
+        fallen = x.reaches(release, trigger, above=False)
+        if fallen is None:
             return
-        released, resume = found, max(found, trigger + dwell)
+        released, resume = fallen, max(fallen, trigger + dwell)
         yield released, "refractory" if resume > released else "release"
 
 
