@@ -165,7 +165,9 @@ class Way(NamedTuple):
 def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command: Array, period_s: float) -> None:
     """Check a recorded body against its plant; `steered` (T, 3), m."""
     # command: in force up to each row, (T, 3), m/s; 0 at the first.
-    t_s, point, rate = way.t_s, steered, command
+    t_s = way.t_s
+    point = steered
+    rate = command
     for plant in plants_of(spec):
         if plant["kind"] == "delay":
             then = t_s - plant["delay_s"]
@@ -203,9 +205,12 @@ def misses_as_recorded(
 
 def _axle(drive: Json, way: Way, steered: Array, command: Array, period_s: float) -> tuple[Array, Array]:
     """Headings, (T,), and axles, (T, 3), of a unicycle, from its heading at the start on."""
-    hand, begun, heading = float(drive["hand_point_m"]), 0, float(drive["heading_rad"])
+    hand = float(drive["hand_point_m"])
+    begun = 0
+    heading = float(drive["heading_rad"])
     headings, axles = np.empty(len(steered)), np.empty_like(steered)
-    headings[0], axles[0] = heading, steered[0] - hand * np.array([math.cos(heading), math.sin(heading), 0.0])
+    headings[0] = heading
+    axles[0] = steered[0] - hand * np.array([math.cos(heading), math.sin(heading), 0.0])
     for k in range(1, len(steered)):
         since = way.t_s[k] - way.t_s[begun]
         u = complex(command[k, 0], command[k, 1]) * np.exp(-1j * heading)  # in the frame of the body

@@ -139,7 +139,8 @@ def _judged(claim: Json, ours: Found) -> str:
         return str(status)
     if ours.exercised is not None:
         least, most = ours.exercised
-        possible, due = type(count) is int and least <= count <= most, f"{least}, at most {most}"
+        possible = type(count) is int and least <= count <= most
+        due = f"{least}, at most {most}"
         holds("how often the claim was exercised", possible, count, due)
     if ours.margin is None or margin is None:
         same("margin", margin, ours.margin)

@@ -30,7 +30,8 @@ def safe_trace(run: Run) -> Found:
     # keeps between the points that it steers.
     margin, least, most = np.inf, 0, 0
     for pair in run.pairs:
-        closing, room = pair.closing_m_s * run.scenario["control"]["period_s"], pair.cover_m + pair.more_m
+        closing = pair.closing_m_s * run.scenario["control"]["period_s"]
+        room = pair.cover_m + pair.more_m
         enough = pair.safe_m + max(margin, closing + room + 2.0 * SMALL)
         if run.apart_m[pair.robot, pair.other] - run.bent_m(pair) >= enough:
             continue  # neither the nearest pair nor near enough to count
@@ -76,17 +77,22 @@ def safe_own(run: Run) -> Found | None:
     # claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE says the same.
     if not any(map(expected_m_s, run.scenario["obstacles"].values())):
         return None
-    period, margin, least, most = run.scenario["control"]["period_s"], np.inf, 0, 0
+    period = run.scenario["control"]["period_s"]
+    margin = np.inf
+    least, most = 0, 0
     rows = np.arange(len(run.t_s) - 1)
     sample = run.sample_row[np.searchsorted(run.sample_row, rows, side="right") - 1]
-    ways, bent = {robot: run.body_m[robot] for robot in run.robots}, {name: w.bent_m() for name, w in run.ways.items()}
+    ways = {robot: run.body_m[robot] for robot in run.robots}
+    bent = {name: w.bent_m() for name, w in run.ways.items()}
     step_m = {robot: np.maximum(*(_lengths(way[ends] - way[sample]) for ends in (rows, rows + 1))) + bent[robot]
               for robot, way in ways.items()}  # fmt: skip
     longest = max(float(step.max()) for step in step_m.values())
     for pair in run.pairs:
-        keeps, closing = pair.in_the_law.passive(period).safe_m - pair.cover_m, pair.closing_m_s * period
+        keeps = pair.in_the_law.passive(period).safe_m - pair.cover_m
+        closing = pair.closing_m_s * period
         there = run.there(pair.other)
-        both, reach = rows[there.start : there.stop - 1], keeps + closing + 2.0 * (longest + pair.cover_m)
+        both = rows[there.start : there.stop - 1]
+        reach = keeps + closing + 2.0 * (longest + pair.cover_m)
         if run.apart_m[pair.robot, pair.other] > max(reach, pair.safe_m + longest):
             continue
         apart_m = pair.shape.held_m(run.apart(pair), run.apart(pair), run.apart(pair), np.inf)[0]
@@ -240,7 +246,8 @@ def safe_hyp(run: Run) -> Found:
 
 def _constants(run: Run) -> None:
     """A h <= 1, each pair without the passive law starts apart, and the sensing range covers d + (closing speed) h."""
-    control, limit = run.scenario["control"], {name: robot["max_speed_m_s"] for name, robot in run.robots.items()}
+    control = run.scenario["control"]
+    limit = {name: robot["max_speed_m_s"] for name, robot in run.robots.items()}
     period, reach = written(control["period_s"]), written(control["sensing_range_m"])
     gain = written(control["avoidance_gain_1_s"]) * period
     holds("gain: A h <= 1", gain <= 1, float(gain), "1 at most")
@@ -296,15 +303,18 @@ def _motion(run: Run) -> None:
             holds("least turning radius", spare >= -SMALL, spare, "0 m at least to spare", about=robot)
         if own := own_of(spec):
             for key, unit in (("drift_m_s", "m/s"), ("cover_m", "m")):
-                speeds, about = column_of(run.samples, f"{robot}.{key}"), f"{own[key]} {unit} at most"
+                speeds = column_of(run.samples, f"{robot}.{key}")
+                about = f"{own[key]} {unit} at most"
                 holds(f"declared {key}", speeds <= own[key] + SMALL, speeds, about, about=robot, t_s=run.sample_s)
         speed = np.linalg.norm(run.sampled(robot, "v", "m_s"), axis=1)
-        slow, most = speed <= spec["max_speed_m_s"] + SMALL, f"{spec['max_speed_m_s']} at most"
+        slow = speed <= spec["max_speed_m_s"] + SMALL
+        most = f"{spec['max_speed_m_s']} at most"
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)
         if robot != run.uav:
             close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)
     for name in run.moving:
-        rows, expected = run.period_rows(name), expected_m_s(run.scenario["obstacles"][name])
+        rows = run.period_rows(name)
+        expected = expected_m_s(run.scenario["obstacles"][name])
         speed = np.linalg.norm(np.diff(run.position_m[name][rows], axis=0), axis=1) / np.diff(run.t_s[rows])
         slow = speed <= expected + SMALL / run.scenario["control"]["period_s"]
         holds("declared speed", slow, speed, f"{expected} at most", about=name, t_s=run.t_s[rows[:-1]])

@@ -81,7 +81,9 @@ class Part:
     def away(self, place: Sequence[Fraction]) -> list[Away]:
         """Exactly, from the nearest point outside, and from the nearest faces inside; equally near ones all do."""
         x, y, z = place
-        height, offsets, faces = Fraction(), [], []
+        height = Fraction()
+        offsets = []
+        faces = []
         if math.isfinite(self.top_m):
             over, under = z - Fraction(self.top_m), Fraction(self.base_m) - z
             height = max(over, Fraction()) - max(under, Fraction())

@@ -180,7 +180,9 @@ def _modes_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> None:
 
 def _noise_moves_as_it_must(run: Run, ugv: str) -> None:
     """(15) from 0: from row to row by Euler's method, with one sample for each period of the noise."""
-    decision, noise, end = run.scenario["decision"], run.column(f"{ugv}.noise_m"), run.t_s[1:]
+    decision = run.scenario["decision"]
+    noise = run.column(f"{ugv}.noise_m")
+    end = run.t_s[1:]
     close("noise at the start", noise[0], 0.0, within=NOISE_M, about=ugv, t_s=float(run.t_s[0]))
     step = np.diff(run.t_s)
     driven = noise[1:] - noise[:-1] * (1.0 - decision["leak_1_s"] * step)
