@@ -32,7 +32,9 @@ class RunFacts:
     """What came of a run that the scenario names, and that was run."""
 
     def __init__(self, report: Report, name: str) -> None:
-        self.name, self.run, self._scenario = name, report.runs[name], report.scenario.resolved
+        self.name = name
+        self.run = report.runs[name]
+        self._scenario = report.scenario.resolved
         self._spec, self._metrics = self._scenario.runs[name], self.run.metrics
         about = sorted((claim for claim in report.claims if claim.run in ("", name)), key=lambda claim: claim.run)
         self._claims = {claim.id: claim for claim in about}

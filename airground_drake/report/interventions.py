@@ -35,7 +35,8 @@ def interventions(trace: Trace) -> list[dict[str, Any]]:
 
 def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) -> dict[str, Any]:
     """What became of a proposal, from what its UGV executed (S,), and the decisions about it, if there are any."""
-    times, during = trace.sampled("t_s"), np.flatnonzero(numbers == sent.number)
+    times = trace.sampled("t_s")
+    during = np.flatnonzero(numbers == sent.number)
     begun_s = float(times[during[0]]) if during.size else None
     ended_s = float(times[during[-1] + 1]) if during.size and during[-1] + 1 < len(times) else None
     yes = None if answers is None else answers[answers["decision"] == "accept"]
@@ -96,7 +97,9 @@ def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float |
 
 def messages(trace: Trace) -> dict[str, Any] | None:
     """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes."""
-    method, scenario, ugvs = method_of(trace.meta["method"]), trace.scenario, trace.ugvs
+    method = method_of(trace.meta["method"])
+    scenario = trace.scenario
+    ugvs = trace.ugvs
     if not method.intervenes:
         return None
     delivered = trace.messages[trace.messages["received_s"].notna()]
@@ -119,7 +122,8 @@ def avoidance(trace: Trace) -> dict[str, dict[str, int]]:
     """By UGV the numbers of control samples at which it executed a proposal, avoidance bound, and both."""
     counted = {}
     for ugv in trace.ugvs:
-        executes, given = trace.sampled(f"{ugv}.executing") >= 0, inequalities_of(trace, ugv)
+        executes = trace.sampled(f"{ugv}.executing") >= 0
+        given = inequalities_of(trace, ugv)
         bound = np.zeros(len(executes), dtype=np.bool_)
         bound[given.sample[given.slack(trace.chosen(ugv)) <= BINDING_M_S]] = True
         counts = {"executing": executes, "binding": bound, "both": executes & bound}

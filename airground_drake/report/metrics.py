@@ -45,7 +45,8 @@ NO_GAP = 1e-9  # a relative optimality gap up to this is a rounding error
 
 def of_run(trace: Trace) -> dict[str, Any]:
     """Metrics of one run, as `model.Metrics` has them."""
-    method, wall_s = method_of(trace.meta["method"]), trace.timings.get("wall_s")
+    method = method_of(trace.meta["method"])
+    wall_s = trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
     return {
@@ -80,7 +81,8 @@ def of_run(trace: Trace) -> dict[str, Any]:
 def came_near(trace: Trace) -> list[dict[str, Any]]:
     """The pair of least margin among those that came nearer than they were when both were first there."""
     # Two entries at most: of all pairs; and of those of an obstacle that may move, if that is another pair.
-    pairs, bounds = pairs_of(trace), apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
+    pairs = pairs_of(trace)
+    bounds = apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
     order = np.argsort(bounds, kind="stable").tolist()
     moving = [k for k in order if kind_of(trace.scenario, pairs[k].first, pairs[k].second) == MOVING]
     nearest = dict[tuple[str, str], dict[str, Any]]()
@@ -130,7 +132,8 @@ def _on_the_way(trace: Trace, ugv: str) -> dict[str, Any]:
     begin_s, end_s = max(trace.t[-1] - AT_REST_S, trace.t[0]), trace.t[-1]
     before_m, left_m = (_way_left_m(trace, ugv, time_s) for time_s in (begin_s, end_s))
     moved_m = moved_at_the_end(trace, ugv)
-    stands, speed_m_s = moved_m <= AT_REST_M, (before_m - left_m) / (end_s - begin_s)
+    stands = moved_m <= AT_REST_M
+    speed_m_s = (before_m - left_m) / (end_s - begin_s)
     creeps = not stands and moved_m < CREEPING * trace.scenario.ugvs[ugv].preset.speed_m_s * (end_s - begin_s)
     return {
         "stands": stands,
@@ -171,7 +174,8 @@ def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
 def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
     """Way of a UGV to its target, m: to the nearest point of its preset that is past by then, and along the preset."""
     own = trace.scenario.ugvs[ugv]
-    corners, place = np.array(own.preset.waypoints_m), interpolate(trace.t, trace.position(ugv), time_s)
+    corners = np.array(own.preset.waypoints_m)
+    place = interpolate(trace.t, trace.position(ugv), time_s)
     legs = np.diff(corners, axis=0)
     lengths = np.maximum(np.linalg.norm(legs, axis=1), 1e-12)  # corners may coincide
     begins = np.cumsum(lengths) - lengths

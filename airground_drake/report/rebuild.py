@@ -158,7 +158,8 @@ def _other_code(provenance: Any) -> str:
     from airground_drake.report.document import commit
 
     about = provenance if isinstance(provenance, dict) else {}
-    written, here = (about.get("package"), about.get("git")), (version("airground_drake"), commit())
+    written = (about.get("package"), about.get("git"))
+    here = (version("airground_drake"), commit())
     if written == here:
         return ""
     return "; other code wrote the report ({}, {}); this is {}, {}".format(*written, *here)

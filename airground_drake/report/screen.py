@@ -208,7 +208,8 @@ def _uav(run: RunFacts) -> Cell:
 
 
 def _seeds(report: Report) -> Iterator[Check]:
-    scenario, of_runs = report.scenario.resolved, grouped((seed.run, seed) for seed in report.seeds)
+    scenario = report.scenario.resolved
+    of_runs = grouped((seed.run, seed) for seed in report.seeds)
     ours = scenario.decision.noise_m_sqrt_s
     noise = [run.set.get("decision.noise_m_sqrt_s", ours) for run in scenario.runs.values()]
     told = grouped(
@@ -264,7 +265,8 @@ def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
     for (zeta, rule), runs in of.items():
         exact, timing = ([run.claim(rule) for run in runs] for rule in (rules.CROSSINGS, rules.TIMING))
         timed = [claim.evidence for claim in timing if "counts" in claim.evidence]
-        mark, fired = _verdict([*exact, *timing]), sum(run.triggers for run in runs)
+        mark = _verdict([*exact, *timing])
+        fired = sum(run.triggers for run in runs)
         says = [f"{counted(fired, 'trigger')} at {zeta:.3g} m ({rules.THRESHOLDS.get(rule, rule)})"]
         if not fired:
             most = [ugv["largest_decision_variable_m"] for claim in exact for ugv in claim.evidence.get("ugvs", ())]

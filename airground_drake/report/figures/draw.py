@@ -208,7 +208,8 @@ def _distances(chosen: _Selection) -> Figure | None:
         gaps = {f"{ugv} to {at.other}": gap_m(trace, ugv, at.other) for ugv, those in of_ugvs.items() for at in those}
         smallest = "; ".join(f"{ugv} {_told(those[0])}" for ugv, those in of_ugvs.items() if those)
         drawing = timelines.distances(trace, of_ugvs, looks, top)
-        table, says = series(trace, "Distances, m", gaps), f"Smallest distances: {smallest}."
+        table = series(trace, "Distances, m", gaps)
+        says = f"Smallest distances: {smallest}."
         name = f"distances-{len(panels)}"
         panels.append(panel(drawing, name, f"Distances, {heading}", says, _runs(heading), table))
     pairs = [(those[0], ugv, heading) for (heading, ugv), those in near.items() if those]

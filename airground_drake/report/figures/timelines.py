@@ -64,7 +64,8 @@ def distances(
             level(axes, d, "-")
         highest = required[-1]
         for at in those:
-            gap, appearance = gap_m(trace, ugv, at.other), look(looks[ugv][at.other])
+            gap = gap_m(trace, ugv, at.other)
+            appearance = look(looks[ugv][at.other])
             time_line(axes, trace.t, gap, appearance)
             labels.append((min(float(gap[-1]), top), short(at.other, 12), appearance.color))
             highest = max(highest, float(np.nanmax(gap)))
@@ -122,7 +123,9 @@ def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
             axes.plot([label.at] * 2, [0.0, y], transform=across, color=color, linewidth=0.6, clip_on=False)
             axes.text(label.begin, y, label.text, color=color, transform=across, va="bottom", fontsize=8, bbox=BOX)
         for event in happened[ugv]:
-            kind, t_s, (low, high) = event["kind"], event["t_s"], axes.get_ylim()
+            kind = event["kind"]
+            t_s = event["t_s"]
+            low, high = axes.get_ylim()
             share = {"trigger": None, "release": None, "proposal": 0.36}.get(kind, 0.09)
             x = np.interp(t_s, trace.t, trace.column(f"{ugv}.decision_variable_m"))
             axes.plot(
@@ -148,7 +151,8 @@ def _left_out(trace: Trace, clock: Clock) -> str:
 
 def _behind(axes: Axes, trace: Trace, ugv: str, clock: Clock) -> None:
     """What is behind the events of a UGV: its decision variable, both levels, calls of the UAV, and cuts."""
-    t, zeta = np.union1d(trace.t[clock.shows(trace.t)], [clock.begin, clock.end]), float(trace.meta["zeta_m"])
+    t = np.union1d(trace.t[clock.shows(trace.t)], [clock.begin, clock.end])
+    zeta = float(trace.meta["zeta_m"])
     x = np.interp(t, trace.t, trace.column(f"{ugv}.decision_variable_m"))
     bottom, top = min(0.0, *x), max(zeta, *x)
     axes.set_ylim(bottom, top + 0.15 * (top - bottom))
@@ -271,7 +275,9 @@ def _ends_s(trace: Trace) -> tuple[float, float]:
 def _time_axes(inner_in: float, above_in: Sequence[float], trace: Trace) -> tuple[Figure, list[Axes]]:
     """Axes over time, stacked, of the same height, with room above each, and on the right for labels."""
     height_in = 0.42 + sum(above_in) + inner_in * len(above_in)
-    figure, every, top_in = Figure(figsize=(WIDE_IN, height_in)), [], height_in
+    figure = Figure(figsize=(WIDE_IN, height_in))
+    every = []
+    top_in = height_in
     for room_in in above_in:
         top_in -= room_in + inner_in
         size = (WIDE_IN - _LEFT_IN - _RIGHT_IN) / WIDE_IN, inner_in / height_in
