@@ -119,8 +119,11 @@ def within(scenario: Scenario, limits: Limits, times: int = 1) -> Estimate:
 
 
 def _of_run(scenario: Scenario, run: Run) -> Estimate:
-    gate, h, duration = scenario.gatekeeper, scenario.control.period_s, scenario.duration_s
-    n, m = len(scenario.ugvs), len(scenario.obstacles) + len(scenario.uav.phantoms_m)
+    gate = scenario.gatekeeper
+    h = scenario.control.period_s
+    duration = scenario.duration_s
+    n = len(scenario.ugvs)
+    m = len(scenario.obstacles) + len(scenario.uav.phantoms_m)
     points, by_outcome = n + m, not METHODS[run.method].intervention_on_top
     rows = duration / min(h, scenario.decision.noise_period_s) + 1.0
     columns = 1 + 6 * (n + 1) + 10 * n

@@ -32,7 +32,9 @@ def _rank(error: ErrorDetails) -> int:
 
 def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schema) -> ScenarioError:
     """An error of pydantic as one line: place, key, value, and what is allowed."""
-    kind, given, says = error["type"], error["input"], error.get("ctx", {})
+    kind = error["type"]
+    given = error["input"]
+    says = error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
     if json_schema.kinds_at(schema, *loc[:-1]):  # it is no mapping that could have a kind
         del loc[-1]
@@ -62,7 +64,8 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
 
 def _of_another_kind(source: str, key: str, kind: str, kinds: dict[str, list[str]]) -> ScenarioError:
     """The error of a key that a mapping of its kind does not have; all kinds with their keys."""
-    part, default = key.rpartition(".")[2], f"{kind}, the default" if kind == next(iter(kinds)) else kind
+    part = key.rpartition(".")[2]
+    default = f"{kind}, the default" if kind == next(iter(kinds)) else kind
     others = [name for name, keys in kinds.items() if part in keys]
     hint = f"it is a key of {' and '.join(others)}; " if others else suggestion(part, kinds[kind])
     return ScenarioError(source, key, UNKNOWN_KEY, f"{hint}keys of {default}: {', '.join(kinds[kind])}")

@@ -224,7 +224,8 @@ def _ends(scenario: Scenario) -> Problems:
     if max(preset_s(preset.waypoints_m, preset.speed_m_s) for preset in presets) > scenario.duration_s:
         return
     for name, ugv in scenario.ugvs.items():
-        away, end = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m), len(ugv.preset.waypoints_m) - 1
+        away = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m)
+        end = len(ugv.preset.waypoints_m) - 1
         for run, spec in scenario.runs.items():
             admitted = alternatives(spec.expected.get(ARRIVAL, "holds"))
             arrives = name not in spec.stalls_m and {"refuted", NOTHING}.isdisjoint(admitted)
@@ -246,7 +247,9 @@ def _gains(scenario: Scenario) -> Problems:
 
 
 def _periods(scenario: Scenario) -> Problems:
-    control, gatekeeper, noise = scenario.control.period_s, scenario.gatekeeper, scenario.decision.noise_period_s
+    control = scenario.control.period_s
+    gatekeeper = scenario.gatekeeper
+    noise = scenario.decision.noise_period_s
     rule = f"must be a whole multiple of control.period_s = {control:.9g} s"
     if scenario.duration_s < control:
         yield "duration_s", scenario.duration_s, f"at least one control period, control.period_s = {control} s"
