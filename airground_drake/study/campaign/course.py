@@ -162,7 +162,8 @@ class Course:
                 break
             place = rng.uniform([0.0, -0.5 * self.width_m], [self.length_m, 0.5 * self.width_m])
             length, width = np.round(rng.uniform(*self.size_m, 2), 6).tolist()
-            heading, hidden = round(rng.uniform(-np.pi, np.pi), 6), rng.random() < self.hidden
+            heading = round(rng.uniform(-np.pi, np.pi), 6)
+            hidden = rng.random() < self.hidden
             shape = Obstacle(_ground(place), known_to_uav=not hidden, heading_rad=heading)
             if kind == "wall":
                 shape.segment_m = [[-length / 2.0, 0.0], [length / 2.0, 0.0]]

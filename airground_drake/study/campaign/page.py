@@ -51,7 +51,8 @@ def told(result: Mapping[str, Any]) -> list[Line]:
     lines = []
     for claim in result["claims"]:
         what = f"{claim['claim']} in run {claim['run']}"
-        bounds, confidence = claim["anytime"], f"confidence {result.get('confidence', 0.0):g}"
+        bounds = claim["anytime"]
+        confidence = f"confidence {result.get('confidence', 0.0):g}"
         if claim["untested"]:
             lines.append(Line("open", f"{what}: the scenario expects a test, but no run tested it."))
         elif claim["refuted"]:

@@ -147,7 +147,8 @@ class Spec(File):
         overrides = dict(self.fixed)
         if self.course is not None:
             base = self._fixed_part
-            distance, rng = base.safe_distance, stream(self.seed, COURSE, index)
+            distance = base.safe_distance
+            rng = stream(self.seed, COURSE, index)
             try:
                 overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m, base.uav.altitude_m)
             except ValueError as error:

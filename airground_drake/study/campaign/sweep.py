@@ -59,7 +59,8 @@ def sweep(
             if name not in allowed:
                 raise UnknownNameError(kind, name, allowed)
     _require_keys(spec)
-    work, indices = partial(rows_of, spec, limits=DEFAULT_LIMITS._replace(plugins=True)), range(spec.combinations)
+    work = partial(rows_of, spec, limits=DEFAULT_LIMITS._replace(plugins=True))
+    indices = range(spec.combinations)
     if jobs == 1:
         draws = {index: work(index) for index in indices}
     else:
