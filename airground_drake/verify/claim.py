@@ -275,7 +275,10 @@ def require_motion(trace: Trace) -> None:
 
 def require_measured(trace: Trace, robot: str) -> None:
     """Check the recorded drift and cover of a user's plant against the recorded positions, and where it begins."""
-    t, samples, place, body = trace.t, trace.sample_rows, trace.position(robot), trace.body(robot)
+    t = trace.t
+    samples = trace.sample_rows
+    place = trace.position(robot)
+    body = trace.body(robot)
     for name, row, end in zip(range(len(samples)), samples, [*samples[1:], len(t) - 1], strict=True):
         lasting, way = t[end] - t[row], place[end] - place[row]
         drift = np.linalg.norm(way / lasting - trace.chosen(robot)[name])
@@ -307,8 +310,12 @@ def require_body(trace: Trace, robot: str) -> None:
 
 def followed(trace: Trace, robot: str) -> Array:
     """The signals of a body that follows the recorded commands from rest, (T, k)."""
-    plant, period, t = trace.plant(robot), trace.scenario.control.period_s, trace.t
-    steered, command, samples = trace.position(robot), trace.command(robot), {*trace.sample_rows.tolist()}
+    plant = trace.plant(robot)
+    period = trace.scenario.control.period_s
+    t = trace.t
+    steered = trace.position(robot)
+    command = trace.command(robot)
+    samples = {*trace.sample_rows.tolist()}
     memory, since = plant.memory(), t[0]
     signals = [plant.at(memory, steered[0], command[0], 0.0)]
     for row in range(1, len(t)):

@@ -47,7 +47,9 @@ class Apart(NamedTuple):
 
 def apart(scenario: Scenario) -> Iterator[Apart]:
     """Who must keep apart: robot by robot each barrier, and then each two robots."""
-    safe, uav, robots = scenario.safe_distance, scenario.uav.name, scenario.robots
+    safe = scenario.safe_distance
+    uav = scenario.uav.name
+    robots = scenario.robots
     for (name, robot), (other, barrier) in product(robots.items(), scenario.barriers.items()):
         moves = barrier.expected_speed_m_s > 0.0
         required = barrier.distance_m or (moves and safe.moving_m) or safe.obstacle_m

@@ -280,7 +280,8 @@ def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
         longer = given[f"{chosen}_left_m"] / max(given[f"{other}_left_m"], LEAST_COST) - 1.0
         yield Deviation(row, f"{chosen} stops farther from the goal than {other}", max(0.0, longer), LONGER)
     for choice in (chosen, other):
-        cost, ahead = given[f"{choice}_outcome_m2_s"], given[f"{choice}_left_m"] ** 3 / (3.0 * max(speed, 1e-9))
+        cost = given[f"{choice}_outcome_m2_s"]
+        ahead = given[f"{choice}_left_m"] ** 3 / (3.0 * max(speed, 1e-9))
         off = cost - ahead if given[f"{choice}_stalls"] == 1.0 else min(0.0, cost - ahead)
         yield Deviation(row, f"cost of the way left, {choice}", off, cost_tolerance(ahead), recomputed=ahead)
 

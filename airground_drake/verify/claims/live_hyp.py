@@ -62,7 +62,9 @@ class LiveHyp(GateClaim):
         """Go through all acceptances; the margin is what is left of the time that LIVE-WAIT allows."""
         gate, accepted = trace.scenario.gatekeeper, acceptances(trace)
         allowed_s = gate.tries * (gate.longest_s + gate.period_s)
-        most, longest_s, where = 0, 0.0, dict[str, Any]()
+        most = 0
+        longest_s = 0.0
+        where = dict[str, Any]()
         wrong = [fault for of_ugv in accepted.values() for fault in _wrong(trace, of_ugv)]
         for ugv, of_ugv in accepted.items():
             begins = _after_rests(of_ugv, gate.rest_s)

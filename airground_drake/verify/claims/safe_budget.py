@@ -111,7 +111,8 @@ class SafeBudget(TheoremClaim):
     def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
         bounds = {name: plant.bounds(speed) for name, (plant, speed) in _plants(inputs).items()}
         for pair in inputs["pairs"]:
-            both, passive = (bounds[pair["first"]], bounds.get(pair["second"], AT_REST)), pair["kind"] == "moving"
+            both = (bounds[pair["first"]], bounds.get(pair["second"], AT_REST))
+            passive = pair["kind"] == "moving"
             kept = kept_distance(pair["law_m"], *both, gain=inputs["avoidance_gain_1_s"], passive=passive)
             says = (
                 f"{pair['first']}, {pair['second']}: {pair['law_m']:.6g} m in the law keep {kept:.6g} m, at least "

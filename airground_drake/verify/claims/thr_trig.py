@@ -257,7 +257,8 @@ def _variable(trace: Trace, ugv: str) -> tuple[NormSignal, dict[str, Any], Confl
     if _block(trace):
         return recorded, {"status": "not_run", "reason": "another block computes the decision variable"}, None
     rebuilt = decision_variable(trace, ugv)
-    value, port = rebuilt.at(trace.t), trace.column(f"{ugv}.decision_variable_m")
+    value = rebuilt.at(trace.t)
+    port = trace.column(f"{ugv}.decision_variable_m")
     off = np.abs(port - value)
     compared = {"status": "holds", "largest_difference_m": float(off.max())}
     if not (off > VARIABLE_TOLERANCE_M).any():

@@ -221,10 +221,12 @@ def _turning_points(cores: Cores, start: Array, end: Array, planar: bool) -> Arr
     ends = np.broadcast_to([0.0, 1.0], (*passed.shape[:-1], 2))
     if planar:
         return np.concatenate([ends, crossed, passed], axis=-1)
-    levels, shares = np.stack([cores.base, cores.top], axis=-1) - start[..., 2:], [ends, crossed, passed]
+    levels = np.stack([cores.base, cores.top], axis=-1) - start[..., 2:]
+    shares = [ends, crossed, passed]
     shares.append(np.broadcast_to(levels / step[..., 0, 2:], (*passed.shape[:-1], 2)))
     whole = np.square(step).sum(axis=-1)
-    length, both = np.square(edges.vector).sum(axis=-1), (edges.vector * flat).sum(axis=-1)
+    length = np.square(edges.vector).sum(axis=-1)
+    both = (edges.vector * flat).sum(axis=-1)
     for level in (levels[..., :1], levels[..., 1:]):
         ahead = (to * flat).sum(axis=-1) + level * step[..., 2]
         shares.append(ahead / whole)
@@ -292,7 +294,8 @@ def closest(cores: Cores, places: Array, *, planar: bool) -> Nearest:
 
 def over_time(cores: Cores, places: Array, *, planar: bool) -> Array:
     """Distances of places (T, 3), m, from the nearest of m cores, (T,), m."""
-    bounds, least = apart_by_blocks(cores, places), np.full(len(places), np.inf)
+    bounds = apart_by_blocks(cores, places)
+    least = np.full(len(places), np.inf)
     for block in range(bounds.shape[1]):
         rows = slice(block * ROWS, (block + 1) * ROWS + (block == bounds.shape[1] - 1))
         first = int(bounds[:, block].argmin())
@@ -327,7 +330,8 @@ def _within(cores: Cores, places: Array, reach: float, planar: bool) -> Iterator
         place = block[some, None] * ROWS + np.arange(ROWS + 1)
         last = block[some, None] == (len(places) - 2) // ROWS  # the row at which a block ends belongs to the next one
         there = (place < len(places)) & ((np.arange(ROWS + 1) < ROWS) | last)
-        place, core = place[there], np.broadcast_to(which[some, None], there.shape)[there]
+        place = place[there]
+        core = np.broadcast_to(which[some, None], there.shape)[there]
         away = away_from(cores.take(core), places[place], planar=planar)
         near = away.distance <= reach
         yield Contacts(place[near], core[near], Away(away.distance[near], away.normal[near]))

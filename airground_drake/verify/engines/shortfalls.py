@@ -82,7 +82,8 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArr
     normal[~normal.any(axis=1)] = np.nan
     d, share = float(pair.d), float(pair.share)
     bound = demanded(d - distance, float(pair.gain), 1.0)
-    met, reach = np.ones(len(distance), dtype=np.bool_), np.zeros(len(distance))
+    met = np.ones(len(distance), dtype=np.bool_)
+    reach = np.zeros(len(distance))
     for body, sign, part in ((first, 1.0, share), (other, -1.0, 1.0 - share)):
         step = np.zeros_like(body[1:]) if pair.held and sign < 0.0 else np.diff(body, axis=0)
         step[-1] /= last
@@ -97,7 +98,8 @@ def _shortfall(ends: Array, pair: _Pair, lasts: Fraction) -> Fraction:
     (here, after, there, beyond), shape, unit = _in_units(ends, pair.core)
     steps = (_minus(after, here), _minus(beyond, there))
     ways = _ways_off(shape, _minus(here, there), pair.planar, unit)
-    apart, reach = _apart(ways), sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
+    apart = _apart(ways)
+    reach = sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
     if apart >= pair.d + reach:
         return Fraction(0)
     if not ways:  # n is unknown: along any n a step is at least minus its length

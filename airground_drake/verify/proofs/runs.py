@@ -105,7 +105,9 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
 
 def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: str, limit_s: float) -> CoqReply:
     """Have Coq prove the table of a run, from its file; it is wanted of all pairs and periods."""
-    theorem, name, gaps = f"{run.name}_obeys_the_law", f"{run.name}_law.v", missed(run, table)
+    theorem = f"{run.name}_obeys_the_law"
+    name = f"{run.name}_law.v"
+    gaps = missed(run, table)
     if not table:
         why = "no pair obeys it in any period" if gaps else "its table has no pair: see docs/verification.md"
         return CoqReply(False, theorem, name, why, missed=gaps)

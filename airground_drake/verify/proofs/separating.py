@@ -98,7 +98,10 @@ class _Search:
     """The rows of a way that a vector serves."""
 
     def __init__(self, prism: Prism, way: Sequence[Vector], rows: Array, safe: int) -> None:
-        self._corners, self._way, self._rows, self._safe = prism.corners, way, rows, safe
+        self._corners = prism.corners
+        self._way = way
+        self._rows = rows
+        self._safe = safe
         offsets = self._rows - prism.nearest(self._rows)
         self._apart = np.linalg.norm(offsets, axis=1)
         self._away = offsets / np.maximum(self._apart, np.finfo(float).tiny)[:, None]
@@ -107,7 +110,8 @@ class _Search:
 
     def longest(self, row: int) -> tuple[int, Vector]:
         """The last row of the longest stretch found that begins at a row, and its vector."""
-        last, nearest = len(self._way) - 1, row + int(np.argmin(self._apart[row:]))
+        last = len(self._way) - 1
+        nearest = row + int(np.argmin(self._apart[row:]))
         best, before = (row, (0, 0, 0)), -1
         short = [normal for normal in self._normals if max(map(abs, normal)) <= SCALES[0]]
         tried: Iterator[Vector] = chain(short, self._rounded(self._away[[nearest, row]]), self._normals)

@@ -38,8 +38,12 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     #
     # Every robot avoids all convex parts of the barriers at rest, then all other robots in team order, then the parts
     # of the barriers that move.
-    scenario, robots, parts = trace.scenario, trace.robots, parts_of(trace)
-    control, barriers, everybody = scenario.control, scenario.barriers, np.arange(len(robots))
+    scenario = trace.scenario
+    robots = trace.robots
+    parts = parts_of(trace)
+    control = scenario.control
+    barriers = scenario.barriers
+    everybody = np.arange(len(robots))
     still, moving = _numbers(trace)
     m = len(still)
     number = {name: k for k, name in enumerate([*barriers, *robots])}
@@ -92,10 +96,12 @@ def outlines_of(trace: Trace) -> Iterator[Array]:
     """The numbers of the outline of each convex part of the barriers, but for the circle round its corners."""
     parts, pairs = parts_of(trace), pairs_beside(trace, trace.robots[0])
     for k, number in enumerate(parts.owner.tolist()):
-        barrier, core = trace.scenario.barriers[parts.names[number]], parts.cores.take(k)
+        barrier = trace.scenario.barriers[parts.names[number]]
+        core = parts.cores.take(k)
         corners = list(dict.fromkeys(map(tuple, core.corners.tolist())))
         heights = [float(core.base), float(core.top), float(len(corners))]
-        gap, speed = pairs[parts.names[number]].required_m, barrier.expected_speed_m_s
+        gap = pairs[parts.names[number]].required_m
+        speed = barrier.expected_speed_m_s
         yield np.array([gap, barrier.radius_m, speed, *heights, *(x for corner in corners for x in corner)])
 
 
@@ -144,7 +150,8 @@ def _place(trace: Trace, wanted: dict[str, Any], parameter: str, k: int) -> dict
         robot, column = divmod(k, length)
         others = wanted["others"].reshape(len(members), -1)[robot]
         still, _ = _numbers(trace)
-        m, moving = len(still), [name for name, barrier in trace.scenario.barriers.items() if barrier.moves]
+        m = len(still)
+        moving = [name for name, barrier in trace.scenario.barriers.items() if barrier.moves]
         beside = parts.names[parts.owner[still[column]]] if column < m else [*trace.robots, *moving][others[column - m]]
         return {"robot": trace.robots[members[robot]], "other": beside}
     if parameter in ("mobility", "max_speed_m_s"):

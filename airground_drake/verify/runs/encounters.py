@@ -75,11 +75,15 @@ class OwnMargins(NamedTuple):
 
 def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     """What a robot left of the distance of a pair by its own doing: the other body is held as at the control sample."""
-    other, rows = pair.second if robot == pair.first else pair.first, np.arange(len(trace.t) - 1)
+    other = pair.second if robot == pair.first else pair.first
+    rows = np.arange(len(trace.t) - 1)
     sample = samples_before(trace)
     cores = cores_of(trace).get(other, Cores.at(np.zeros((1, 3))))
-    place, origin, planar = trace.body(robot), origin_of(trace, other), is_planar(trace, robot)
-    keeps, off_m = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m, off_m_of(trace, robot)
+    place = trace.body(robot)
+    origin = origin_of(trace, other)
+    planar = is_planar(trace, robot)
+    keeps = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m
+    off_m = off_m_of(trace, robot)
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
     beside = cores.take(np.flatnonzero(bounds <= max(keeps, pair.safe_m) + step.max())).take((slice(None), None))
@@ -88,7 +92,8 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
         return margins
     at_sample = away_from(beside, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
     there = (sample >= pair.row) & (rows < pair.last)
-    gaps, short = gap_over_time(trace, pair), pair.required_m - DISTANCE_TOLERANCE_M
+    gaps = gap_over_time(trace, pair)
+    short = pair.required_m - DISTANCE_TOLERANCE_M
     broken = there & (rows >= _first_apart(pair, gaps)) & (np.minimum(gaps[:-1], gaps[1:]) < short)
     near = there & ((at_sample <= keeps + step) | broken)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
@@ -238,7 +243,8 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) 
         caught = float(ends[begin]), float(min(ends[end + 1], max(t_s, ends[end])))
         names = dict.fromkeys(name for of_period in blocked[begin : end + 1] for name in of_period)
     velocity = periods.velocity[k]
-    speed, limit = float(np.linalg.norm(velocity)), trace.scenario.robots[pair.first].max_speed_m_s
+    speed = float(np.linalg.norm(velocity))
+    limit = trace.scenario.robots[pair.first].max_speed_m_s
     away = float(periods.normal[k] @ velocity)
     return encounter._replace(
         reaction=_reaction(speed, away, limit), speed_m_s=speed, blocked_by=(*names,), caught_s=caught
@@ -256,7 +262,8 @@ def _reaction(speed: float, away: float, limit: float) -> str:
 
 def _blocked_by(trace: Trace, pair: Pair, periods: Periods, k: int, given: Inequalities, sample: int) -> list[str]:
     """The bodies whose inequalities forbid the straight retreat that a robot should make in a period."""
-    h, limit = trace.scenario.control.period_s, trace.scenario.robots[pair.first].max_speed_m_s
+    h = trace.scenario.control.period_s
+    limit = trace.scenario.robots[pair.first].max_speed_m_s
     wished = min(pair.speed_m_s - (float(periods.apart_m[k]) - pair.law_m) / h, limit)
     if wished <= BLOCKED_M_S:
         return []

@@ -244,7 +244,8 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
     """The smallest gap of a pair over continuous time."""
     # It is exact if both bodies move on straight lines between rows, and to `BENT_M` where it is below the one
     # required; else it is a lower bound.
-    t, off_m = trace.t[pair.rows], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
+    t = trace.t[pair.rows]
+    off_m = off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
     cores = cores_of(trace).get(pair.second)
     if cores is None:
         first, second = trace.body(pair.first), trace.body(pair.second)
@@ -279,7 +280,8 @@ def at_appearance(trace: Trace, gap: Gap) -> bool:
 @per_trace
 def steered_margin(trace: Trace, pair: Pair) -> float:
     """The least distance of the points of a pair that the law steers, less what the law keeps, m."""
-    cores, first = cores_of(trace).get(pair.second), trace.position(pair.first)[pair.rows]
+    cores = cores_of(trace).get(pair.second)
+    first = trace.position(pair.first)[pair.rows]
     if cores is None:
         second = trace.position(pair.second)[pair.rows]
         return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
@@ -289,11 +291,13 @@ def steered_margin(trace: Trace, pair: Pair) -> float:
 
 def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
-    cores, planar = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3)))), is_planar(trace, pair.first)
+    cores = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3))))
+    planar = is_planar(trace, pair.first)
     way = seen_from(trace, pair.first, pair.second)[pair.rows]
     beside = cores.take((slice(None), None))
     lower = least_distances(beside, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
-    most, t = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS), trace.t[pair.rows]
+    most = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
+    t = trace.t[pair.rows]
     approaches = list[Approach]()
     for k in sorted(np.flatnonzero(lower < pair.safe_m).tolist(), key=lower.__getitem__):
         best = min(approaches).distance_m if approaches else inf
@@ -370,8 +374,10 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
 
 def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> npt.NDArray[np.bool_]:
     """At which places (K, 3), m, of its steered point a robot is by more than `by_m` too near to a barrier, (K,)."""
-    too_near, pairs = np.zeros(len(places), dtype=np.bool_), pairs_beside(trace, robot)
-    parts, row = parts_of(trace), max(int(np.searchsorted(trace.t, t_s + MERGE_S)) - 1, 0)
+    too_near = np.zeros(len(places), dtype=np.bool_)
+    pairs = pairs_beside(trace, robot)
+    parts = parts_of(trace)
+    row = max(int(np.searchsorted(trace.t, t_s + MERGE_S)) - 1, 0)
     keep = np.array([pairs[name].law_m for name in parts.names])[parts.owner] - by_m
     rows, most = np.full(len(places), row), float(keep.max(initial=0.0))
     near = contacts(trace, places, rows, most, planar=is_planar(trace, robot))

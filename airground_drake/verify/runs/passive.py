@@ -89,8 +89,11 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
     which = np.flatnonzero((ends[:-1] >= pair.row) & (ends[:-1] < pair.last))
     row = ends[which]
     around = np.append(row, ends[which[-1:] + 1])  # the ends, too
-    cores, planar, keeps = cores_of(trace)[pair.second], is_planar(trace, pair.first), pair.keeps_m(period)
-    first, origin = trace.position(pair.first)[around], origin_of(trace, pair.second)[around]
+    cores = cores_of(trace)[pair.second]
+    planar = is_planar(trace, pair.first)
+    keeps = pair.keeps_m(period)
+    first = trace.position(pair.first)[around]
+    origin = origin_of(trace, pair.second)[around]
     away = away_from(cores.take((slice(None), None)), (first - origin)[:-1], planar=planar)
     nearest, k = away.distance.argmin(axis=0), np.arange(len(row))
     last = last_period(trace) if len(which) and which[-1] == len(ends) - 2 else Fraction(1)
@@ -158,7 +161,8 @@ def beside_moving(trace: Trace) -> list[BesideMoving]:
 
 
 def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
-    fast, slop = speeds(trace), DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
+    fast = speeds(trace)
+    slop = DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
     for periods in beside(trace):
         pair = periods.pair
         speed = fast.get(pair.second, np.zeros(1))

@@ -97,7 +97,9 @@ def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
     """First row at which the noise of a UGV is not that of dn = -leak n dt + s dW, by Euler's method over rows."""
     # It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at
     # the rate s w / sqrt(h) - leak n.
-    given, t, n = trace.scenario.decision, trace.t, trace.column(f"{ugv}.noise_m")
+    given = trace.scenario.decision
+    t = trace.t
+    n = trace.column(f"{ugv}.noise_m")
     if abs(n[0]) > NOISE_TOLERANCE_M:
         return {"t_s": float(t[0]), "what": "noise: does not start at 0", "noise_m": float(n[0])}
     dt, h = np.diff(t), given.noise_period_s
