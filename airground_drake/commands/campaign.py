@@ -170,9 +170,7 @@ def _by_value(entry: dict[str, Any]) -> str:
         for name, words in (("first_trigger_s", "first trigger"), ("arrival_s", "last arrival"))
         if entry[name] is not None
     ]
-    said = [
-        f"{entry['arrived']} of {entry['ugvs']} arrived",
-        *times,
-        *([f"refuted: {', '.join(refuted)}"] * bool(refuted)),
-    ]
+    said = [f"{entry['arrived']} of {entry['ugvs']} arrived", *times]
+    if refuted:
+        said.append(f"refuted: {', '.join(refuted)}")
     return f"    {entry['value']!s:10} {entry['run']:10} {'; '.join(said)}"

@@ -11,6 +11,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import one_line, short
 from airground_drake.base.usage import output_file
 from airground_drake.report import compare
+from airground_drake.report.sentences import counted
 from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
@@ -75,10 +76,10 @@ def _lines(changes_of: Mapping[str, Any]) -> Iterator[str]:
         if len(changes) > MOST_LINES:
             yield f"  and {len(changes) - MOST_LINES} more: --json has all"
     if rounded:
-        yield f"{rounded} number{'' if rounded == 1 else 's'} changed by no more than rounding: --json has all"
+        yield f"{counted(rounded, 'number')} changed by no more than rounding: --json has all"
     count = changes_of["regressions"]
     said = ", ".join(changed) or ("nothing else" if rounded else "nothing")
-    yield f"{said} changed; {count or 'no'} regression{'' if count == 1 else 's'}"
+    yield f"{said} changed; {counted(count, 'regression') if count else 'no regressions'}"
 
 
 def _line(change: Mapping[str, Any]) -> str:
