@@ -46,7 +46,7 @@ def build(
         {
             **verdict.to_json(),
             "rerun": f"airground verify trace/{verdict.run or some_run} {verdict.claim.id}"
-            + f" {OPTION}" * (verdict.claim.id in scenario.claims),
+            + (f" {OPTION}" if verdict.claim.id in scenario.claims else ""),
         }
         for verdict in verdicts
     ]

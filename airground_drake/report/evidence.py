@@ -52,8 +52,9 @@ def _table(caption: str, records: Sequence[tuple[str, Mapping[str, Any]]], numbe
     rows = tuple(
         (head, *(_cell(record[key], number) if key in record else "" for key in shown)) for head, record in records
     )
-    more = [f"{len(rows) - MAX_ROWS} more rows"] * (len(rows) > MAX_ROWS)
-    more += [f"{left_out} more columns"] * (left_out > 0)
+    more = [f"{len(rows) - MAX_ROWS} more rows"] if len(rows) > MAX_ROWS else []
+    if left_out > 0:
+        more.append(f"{left_out} more columns")
     note = f" ({', '.join(more)} in report.json)" if more else ""
     return Table(f"{caption}{note}", ("", *map(in_words, shown)), rows[:MAX_ROWS])
 

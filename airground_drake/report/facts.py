@@ -129,10 +129,10 @@ class RunFacts:
         if not doings or "" in doings:
             return ""
         if not ours:
-            return "not the robots' doing" * (self.claim(rules.OWN_DOING).status != "refuted")
+            return "" if self.claim(rules.OWN_DOING).status == "refuted" else "not the robots' doing"
         if len(ours) < len(doings):
             return f"{len(ours)} of {len(doings)} the robots' doing"
-        return "the robots' doing" + ", by commands already under way" * ({*ours} == {"under way"})
+        return "the robots' doing" + (", by commands already under way" if {*ours} == {"under way"} else "")
 
     @property
     def contradicts_its_proof(self) -> bool:

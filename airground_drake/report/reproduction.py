@@ -153,7 +153,7 @@ def _shortcomings(trace: Trace, robot: str) -> list[str]:
     lacks += [f"it triggers below the threshold at {_listed(early)}"] if early else []
     lacks += [] if accepted else ["the gatekeeper never accepts"]
     lacks += [f"the gatekeeper refuses at {_listed(refused)}"] if refused else []
-    return lacks + ["it does not arrive"] * (not _arrived(trace, robot))
+    return lacks if _arrived(trace, robot) else [*lacks, "it does not arrive"]
 
 
 @measure
@@ -168,7 +168,7 @@ def _taken_back(trace: Trace, robot: str) -> list[str]:
     accepted = _times(trace, robot, "accept")[:1]
     refused = [t for t in _times(trace, robot, "refuse") if accepted and t > accepted[0]]
     lacks = [f"accepted at {_listed(accepted)}, refused at {_listed(refused)}"] if refused else []
-    return lacks + ["it does not arrive"] * (not _arrived(trace, robot))
+    return lacks if _arrived(trace, robot) else [*lacks, "it does not arrive"]
 
 
 @measure

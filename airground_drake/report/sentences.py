@@ -52,7 +52,7 @@ def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
 
 def counted(count: int, noun: str) -> str:
     """A number and its noun: "1 check", "2 checks"."""
-    return f"{count} {noun}{'s' * (count != 1)}"
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def joined(words: Sequence[str]) -> str:

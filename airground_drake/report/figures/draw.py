@@ -159,10 +159,11 @@ def _trajectories(chosen: _Selection) -> Figure:
     frame_is = " Frame: the arena." if first.scenario.arena_m else ""
     frame_is += " Dots: ways of obstacles, drawn where they start." if any(len(body.way_m) for body in barriers) else ""
     drawn = {mark.kind for key in keys.values() for entry in key for mark in entry.marks}
-    marks = "".join(f", {text}" for kind, text in _MARKS.items() if kind in drawn)
-    last = f" Where more than {maps.MAX_MARKS} marks would be, only the last proposal of each UGV is drawn."
-    marks += "." + last * any(not entry.letter for key in keys.values() for entry in key)
-    marks += " Thick: the UGV follows the UAV." * ("accepted" in drawn)
+    marks = "".join(f", {text}" for kind, text in _MARKS.items() if kind in drawn) + "."
+    if any(not entry.letter for key in keys.values() for entry in key):
+        marks += f" Where more than {maps.MAX_MARKS} marks would be, only the last proposal of each UGV is drawn."
+    if "accepted" in drawn:
+        marks += " Thick: the UGV follows the UAV."
     caption = (
         f"○ start, \N{MULTIPLICATION SIGN} target{marks} "
         f"{'. '.join(kinds)} (hollow: not on the UAV's map), {circles}.{frame_is} Thin dashed line: the UAV.{thin}"
@@ -186,7 +187,7 @@ def _points(trace: Trace, robots: list[str], marks: Sequence[maps.Mark]) -> Tabl
     )
     told = [(mark.ugv, mark.t_s, maps.told([mark]), mark.at) for mark in marks[:MAX_TABLE_ROWS]]
     rows = tuple((r, f"{t:.2f}", what, *(f"{x:.3f}" for x in at)) for r, t, what, at in [*starts, *told, *ends])
-    some = f", the first {MAX_TABLE_ROWS} of {len(marks)} events" * (len(marks) > MAX_TABLE_ROWS)
+    some = f", the first {MAX_TABLE_ROWS} of {len(marks)} events" if len(marks) > MAX_TABLE_ROWS else ""
     return Table(f"Run {trace.run}: what happened where{some}", ("robot", "t, s", "what", "x, m", "y, m"), rows)
 
 
@@ -241,7 +242,7 @@ def _timelines(chosen: _Selection) -> Figure:
         panels.append(panel(drawing, name, f"Events over time, {heading}", says, heading, _happened(trace, rows)))
     drawn = {event["kind"] for trace in chosen.runs.values() for event in trace.events}
     marks = ", ".join(text for kind, text in _EVENTS.items() if kind in drawn)
-    more = f" At most {MAX_TEAM} UGVs are drawn, up to {hidden} more are in the trace." * (hidden > 0)
+    more = f" At most {MAX_TEAM} UGVs are drawn, up to {hidden} more are in the trace." if hidden > 0 else ""
     caption = (
         "Line: decision variable. Grey: the UAV is called. Hatched bar: the UGV follows the UAV."
         f"{marks and f' {marks}.'} // time in which nothing happens is left out.{more}"
@@ -255,7 +256,7 @@ def _happened(trace: Trace, ugvs: Sequence[str]) -> Table:
     every = [(e["t_s"], ugv, e["kind"]) for ugv in ugvs for e in events_of(trace, ugv, *timelines.MARKS)]
     every = sorted(every) or [(float(trace.t[x[ugv].argmax()]), ugv, "largest value") for ugv in ugvs]
     rows = ((f"{t:.3f}", ugv, what, f"{np.interp(t, trace.t, x[ugv]):.3f}") for t, ugv, what in every[:MAX_TABLE_ROWS])
-    some = f", the first {MAX_TABLE_ROWS} of {len(every)}" * (len(every) > MAX_TABLE_ROWS)
+    some = f", the first {MAX_TABLE_ROWS} of {len(every)}" if len(every) > MAX_TABLE_ROWS else ""
     return Table(f"Run {trace.run}: events{some}", ("t, s", "UGV", "event", "decision variable, m"), tuple(rows))
 
 

@@ -148,7 +148,8 @@ def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
 
 def lines_of(key: Sequence[Entry]) -> list[tuple[str, str]]:
     """The lines below a map: a letter at the beginning of an entry that has one, and text."""
-    return [(entry.letter * (k == 0), line) for entry in key for k, line in enumerate(wrap(entry.text, LINE_CHARS))]
+    texts = ((entry.letter, wrap(entry.text, LINE_CHARS)) for entry in key)
+    return [("" if k else letter, line) for letter, lines in texts for k, line in enumerate(lines)]
 
 
 def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, key: Sequence[Entry], lines: int) -> Figure:

@@ -209,7 +209,11 @@ def told(trace: Trace, ugv: str) -> str:
     if len(marks) <= MAX_TOLD:
         return f"{', '.join(_word(event['kind'], event['t_s']) for event in marks)} s"
     times = {kind: [event["t_s"] for event in marks if event["kind"] == kind] for kind in MARKS}
-    counts = (f"{len(t)} \N{MULTIPLICATION SIGN} " * (len(t) > 1) + _word(kind, t[0]) for kind, t in times.items() if t)
+    counts = [
+        _word(kind, t[0]) if len(t) == 1 else f"{len(t)} \N{MULTIPLICATION SIGN} {_word(kind, t[0])}"
+        for kind, t in times.items()
+        if t
+    ]
     return f"{', '.join(counts)} s (first times)"
 
 
