@@ -191,7 +191,9 @@ def replace(document: Document, override: str) -> None:
 def place_of(key: str) -> tuple[str, ...]:
     """The names and indices of a dotted key."""
     at = tuple(key.strip().split("."))
-    return at[:3] + (".".join(at[3:]),) * (len(at) > 3) if at[::2][:2] == ("runs", "set") else at  # its keys have dots
+    if len(at) > 3 and at[::2][:2] == ("runs", "set"):
+        return *at[:3], ".".join(at[3:])  # its keys have dots
+    return at
 
 
 def way(data: Any, key: str) -> list[Any]:

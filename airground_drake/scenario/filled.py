@@ -49,8 +49,8 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
     place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else loc
     wanted = f"wanted: {json_schema.wanted_at(schema, *place)}"
     if kind == "missing":
-        new = f", as {'.'.join(at[:-1])} is new" * source.startswith("--set ")
-        return ScenarioError(source, key, Fault("missing"), wanted + new)
+        wanted += f", as {'.'.join(at[:-1])} is new" if source.startswith("--set ") else ""
+        return ScenarioError(source, key, Fault("missing"), wanted)
     if given is None:
         given = Fault("no value is given")
     elif isinstance(given, dict):

@@ -227,7 +227,7 @@ def _scenario(
     lines = [
         *(f"# {one_line(comment)}" for comment in comments),
         f'name: "{name}"',
-        text_of({"title": one_line(f"{len(robots)} UGV{'s' * (len(robots) > 1)} in {path.name}")}).strip(),
+        text_of({"title": one_line(f"{len(robots)} {'UGVs' if len(robots) > 1 else 'UGV'} in {path.name}")}).strip(),
         f"duration_s: {_number(pace.duration)}",
         "",
         "uav:",

@@ -59,7 +59,7 @@ def _allowed(key: str, part: Schema) -> str:
     says = part["properties"][key]
     words = [_kind(says)]
     if says.get("type") == "number":
-        words += ["0 or more"] * (says["minimum"] == 0.0) + ["above 0"] * (says["minimum"] > 0.0)
+        words += ["0 or more"] if says["minimum"] == 0.0 else ["above 0"] if says["minimum"] > 0.0 else []
     if says.get("type") == "integer":
         words.append(f"{says['minimum']} to {says['maximum']}")
     if "default" in says and says["default"] not in ({}, [], "", None):

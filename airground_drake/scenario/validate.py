@@ -386,7 +386,9 @@ def _extent(scenario: Scenario) -> Problems:
     for name, body in scenario.barriers.items():
         shape = next((key for key in SHAPES if getattr(body, key)), "position_m")
         corners = outlines_of(scenario, body)[:, outline.CORNERS :].reshape(-1, 2)  # and zeros
-        places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()] + [body.position_m] * bool(body.position_m)
+        places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()]
+        if body.position_m:
+            places.append(body.position_m)
         if body.moves:
             shape, places = "moves.waypoints_m", [*places, *body.moves.waypoints_m]
         key = f"{_key_of(name)}.{'file' if name == MAP else shape}"
@@ -418,8 +420,9 @@ def _filled(scenario: Scenario) -> str:
     cells = scenario.map.cells if scenario.map else None
     if cells is None:
         return ""
-    told = [f"{cells.unsure} unknown ones"] * bool(cells.unsure and cells.unknown == "occupied")
-    told += [f"{cells.unreached} free ones that cannot be reached from any start"] * bool(cells.unreached)
+    told = [f"{cells.unsure} unknown ones"] if cells.unsure and cells.unknown == "occupied" else []
+    if cells.unreached:
+        told.append(f"{cells.unreached} free ones that cannot be reached from any start")
     return f" (of whose cells {' and '.join(told)} count as occupied)" if told else ""
 
 
