@@ -112,7 +112,7 @@ def _is_deep(value: Any) -> bool:
         nested = [part for part in level if isinstance(part, (dict, list))]
         if not nested:
             return False
-        level = [part for each in nested for part in (each.values() if isinstance(each, dict) else each)]
+        level = [part for above in nested for part in (above.values() if isinstance(above, dict) else above)]
     return True
 
 

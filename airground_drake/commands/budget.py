@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _about(group: Sequence[PairBudget]) -> str:
     """The pairs of a group in words."""
-    first, second = (list(dict.fromkeys(getattr(each, name) for each in group)) for name in ("first", "second"))
+    first, second = (list(dict.fromkeys(getattr(pair, name) for pair in group)) for name in ("first", "second"))
     kind = group[0].kind
     if kind == "ugv":
         return f"two UGVs ({_named([*dict.fromkeys([*first, *second])])})"
@@ -77,7 +77,7 @@ def _entry(group: Sequence[PairBudget]) -> dict[str, object]:
     pair = group[0]
     return {
         "kind": pair.kind,
-        "pairs": [[each.first, each.second] for each in group],
+        "pairs": [[member.first, member.second] for member in group],
         "promised_m": pair.promised_m,
         "in_the_law_m": pair.gap_m,
         "terms": [{"key": term.key, "metres": term.metres} for term in pair.terms],

@@ -54,8 +54,7 @@ class Clock(NamedTuple):
     def at(self, t: Array | Sequence[float]) -> Array:
         """Places of times on the axis; a time that is left out is in a cut, or at an end."""
         knots, places = ([start, start + self.end - self.begin] for start in (self.begin, self.place))
-        found: Array = np.interp(t, np.column_stack(knots).ravel(), np.column_stack(places).ravel())
-        return found
+        return np.asarray(np.interp(t, np.column_stack(knots).ravel(), np.column_stack(places).ravel()))
 
     def shows(self, t: Array) -> npt.NDArray[np.bool_]:
         """Whether times are shown."""

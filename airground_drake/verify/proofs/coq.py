@@ -45,9 +45,9 @@ def version() -> str:
 
 def screen(text: str, name: str) -> None:
     """Refuse a file that assumes something, or turns off a check of Coq."""
-    found = UNSOUND.search(without_comments(text))
-    if found:
-        raise CoqError(f"{name} has the word {found[0]!r}: a theory may assume nothing")
+    unsound = UNSOUND.search(without_comments(text))
+    if unsound:
+        raise CoqError(f"{name} has the word {unsound[0]!r}: a theory may assume nothing")
 
 
 def without_comments(text: str) -> str:
