@@ -63,7 +63,7 @@ class Imported(NamedTuple):
 
 def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes, height_m: float) -> Imported:
     """The scenario of a Gazebo world; without robots, one goes where the BARN challenge asks it to go."""
-    # What begins above the height of UGVs is no obstacle of theirs: it is left out, and the UAV flies over it.
+    # Objects that begin above the height of UGVs do not stand in their way: they are left out; the UAV flies over them.
     world = gazebo.world(_text(path), str(path))
     left_out = [f"left out: {model}" for model in world.left_out]
     if not world.solids:

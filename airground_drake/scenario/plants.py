@@ -21,13 +21,13 @@ NO_THEOREM = "no theorem covers another combination"
 
 
 def tag_of(given: Any) -> str:
-    """The class that a plant's keys belong to, by its name in `KEYS`; the default's for what is no mapping."""
+    """The name in `KEYS` of the class that a plant's keys belong to; without a mapping, that of the default plant."""
     kind = given.get("kind", AS_TOLD) if isinstance(given, dict) else getattr(given, "kind", AS_TOLD)
     return kind if kind in PLANTS.own else OWN
 
 
 def _known(given: Any, info: ValidationInfo) -> Any:
-    """Refuse a kind that is no name of a plant, whatever the other keys are."""
+    """Refuse a kind that does not name a plant, whatever the other keys are."""
     kind = given.get("kind", AS_TOLD) if isinstance(given, dict) else AS_TOLD
     if isinstance(kind, str) and info.context != RECORDED and not PLANTS.accepts(kind):
         raise refused(kind, f"one of {', '.join(PLANTS.allowed)}{plugin_path(kind)}", "kind")
