@@ -90,8 +90,8 @@ def checked(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = 
 
 def verdict(lines: Sequence[CheckLine]) -> int:
     """The exit code: 1 if a line disagrees or cannot be checked, else 3 if one is not reproduced here, else 0."""
-    found = {line.outcome for line in lines}
-    return 1 if found & {DISAGREES, OPEN} else 3 if NOT_HERE in found else 0
+    outcomes = {line.outcome for line in lines}
+    return 1 if outcomes & {DISAGREES, OPEN} else 3 if NOT_HERE in outcomes else 0
 
 
 def show(lines: Sequence[CheckLine], folder: Path, taken: Sequence[str], *, as_json: bool) -> None:

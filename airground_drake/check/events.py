@@ -25,13 +25,13 @@ class Event(NamedTuple):
 def check_events(run: Run) -> str:
     """Compare the recorded arrivals and collisions, and the places of all events, with the positions."""
     recorded = [
-        Event(**{name: value for name, value in each.items() if name not in ("position_m", "at_m")})
-        for each in run.events
-        if each["kind"] in ("arrival", "collision")
+        Event(**{name: value for name, value in event.items() if name not in ("position_m", "at_m")})
+        for event in run.events
+        if event["kind"] in ("arrival", "collision")
     ]
     hits = [*_collisions(run)]
-    found = [*_arrivals(run, hits), *hits]
-    for theirs, ours in zip_longest(sorted(recorded), sorted(found)):
+    recomputed = [*_arrivals(run, hits), *hits]
+    for theirs, ours in zip_longest(sorted(recorded), sorted(recomputed)):
         if theirs != ours:
             first = min(event for event in (theirs, ours) if event is not None)
             raise Disagreement("arrivals and collisions follow from positions", theirs, ours, first.robot, first.t_s)
@@ -39,7 +39,7 @@ def check_events(run: Run) -> str:
         here = [np.interp(event["t_s"], run.t_s, axis) for axis in run.body_m[event["robot"]].T]
         about = f"{event['kind']} of {event['robot']}"
         close("place of an event", event["position_m"], here, within=SMALL, about=about, t_s=event["t_s"])
-    return f"{len(found) - len(hits)} arrivals, {len(hits)} collisions"
+    return f"{len(recomputed) - len(hits)} arrivals, {len(hits)} collisions"
 
 
 def _arrivals(run: Run, hits: Sequence[Event]) -> Iterator[Event]:

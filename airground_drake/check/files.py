@@ -36,7 +36,7 @@ def is_plain(name: Any) -> bool:
 
 def names_in(folder: Path) -> list[str]:
     """The relative paths of all files in a folder, sorted."""
-    found: list[str] = []
+    paths: list[str] = []
     for place, folders, files in os.walk(folder):
         for name in (*folders, *files):
             path = os.path.join(place, name)
@@ -44,10 +44,10 @@ def names_in(folder: Path) -> list[str]:
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
                 raise NotEstablished("a report has regular files and folders only", "it is neither", path)
         inside = "" if place == os.fspath(folder) else f"{os.path.relpath(place, folder)}/"
-        found += [inside + name for name in files]
-        if len(found) > MOST_FILES:
+        paths += [inside + name for name in files]
+        if len(paths) > MOST_FILES:
             raise NotEstablished("a report has few files", f"more than {MOST_FILES}", str(folder))
-    return sorted(found)
+    return sorted(paths)
 
 
 def read_bytes(path: Path) -> bytes:
@@ -75,10 +75,10 @@ def read_json(path: Path) -> Any:
     """Strict JSON: no NaN, no infinity, no key twice."""
     content, name = read_bytes(path), path.name
 
-    def unique(found: list[tuple[str, Any]]) -> Json:
-        value = dict(found)
-        if len(value) < len(found):
-            key, count = Counter(key for key, _ in found).most_common(1)[0]
+    def unique(entries: list[tuple[str, Any]]) -> Json:
+        value = dict(entries)
+        if len(value) < len(entries):
+            key, count = Counter(key for key, _ in entries).most_common(1)[0]
             raise Disagreement("a key is there once", count, 1, f"{name}: {key}")
         return value
 
@@ -109,10 +109,10 @@ def _is_deep(value: Any) -> bool:
     """Whether a value is nested deeper than `DEEPEST`, level by level."""
     level = [value]
     for _ in range(DEEPEST + 1):
-        nested = [each for each in level if isinstance(each, (dict, list))]
+        nested = [part for part in level if isinstance(part, (dict, list))]
         if not nested:
             return False
-        level = [part for each in nested for part in (each.values() if isinstance(each, dict) else each)]
+        level = [part for above in nested for part in (above.values() if isinstance(above, dict) else above)]
     return True
 
 
@@ -155,4 +155,4 @@ def _is_text_type(kind: pa.DataType) -> bool:
 
 def _is_number_type(kind: pa.DataType) -> bool:
     of = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
-    return any(each(kind) for each in of)
+    return any(is_type(kind) for is_type in of)

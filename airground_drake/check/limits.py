@@ -38,7 +38,7 @@ def is_of_a_size(scenario: Json) -> None:
     counts = {
         "samples": max((time_s / period_s if period_s > 0.0 else math.inf for period_s in periods_s), default=0.0),
         "stages": numbers.get(("gatekeeper", "stages"), 0.0),
-        "robots and obstacles": sum(len(each) for each in bodies if isinstance(each, dict)),
+        "robots and obstacles": sum(len(of_kind) for of_kind in bodies if isinstance(of_kind, dict)),
         "numbers of a shape": max(shapes.values(), default=0),
     }
     for name, count in counts.items():

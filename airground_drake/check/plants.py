@@ -101,22 +101,22 @@ def _dip_m(drive: Json, chord_m: float, period_s: float) -> float:
     return angle * chord_m * (0.5 * angle) / math.sin(0.5 * angle) / 8.0 if angle else 0.0
 
 
-def law_m(safe_m: float, one: Taken, other: Taken | None, *, passive: bool) -> float:
+def law_m(safe_m: float, own: Taken, other: Taken | None, *, passive: bool) -> float:
     """Distance that the law keeps so that the bodies keep `safe_m`, m; `other` is None beside an obstacle."""
     if passive:
-        return safe_m + one.cover_m + one.drift_m
-    if other is None and one.drawn_m:
-        return math.sqrt(safe_m**2 + one.drawn_m**2) + (one.body_m - one.drawn_m)
-    both = (one, other) if other else (one, Taken(0.0, one.lag_s, one.delay_s, 0.0))
-    late = safe_m + abs(both[0].delay_s - both[1].delay_s) * min(each.most_m_s for each in both)
-    closing, bodies = sum(each.most_m_s for each in both), sum(each.body_m + each.drift_m for each in both)
-    if not any(each.lag_s for each in both):
+        return safe_m + own.cover_m + own.drift_m
+    if other is None and own.drawn_m:
+        return math.sqrt(safe_m**2 + own.drawn_m**2) + (own.body_m - own.drawn_m)
+    both = (own, other) if other else (own, Taken(0.0, own.lag_s, own.delay_s, 0.0))
+    late = safe_m + abs(both[0].delay_s - both[1].delay_s) * min(plant.most_m_s for plant in both)
+    closing, bodies = sum(plant.most_m_s for plant in both), sum(plant.body_m + plant.drift_m for plant in both)
+    if not any(plant.lag_s for plant in both):
         return late + bodies
-    found = []
+    bounds_m = []
     for tau in {0.0, both[0].lag_s, both[1].lag_s}:
-        unlike = sum(abs(each.lag_s - tau) * each.most_m_s for each in both)
-        found.append(unlike + math.sqrt(late**2 + (tau * closing) ** 2))
-    return min(found) + bodies
+        unlike = sum(abs(plant.lag_s - tau) * plant.most_m_s for plant in both)
+        bounds_m.append(unlike + math.sqrt(late**2 + (tau * closing) ** 2))
+    return min(bounds_m) + bodies
 
 
 class Way(NamedTuple):
@@ -165,7 +165,9 @@ class Way(NamedTuple):
 def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command: Array, period_s: float) -> None:
     """Check a recorded body against its plant; `steered` (T, 3), m."""
     # command: in force up to each row, (T, 3), m/s; 0 at the first.
-    t_s, point, rate = way.t_s, steered, command
+    t_s = way.t_s
+    point = steered
+    rate = command
     for plant in plants_of(spec):
         if plant["kind"] == "delay":
             then = t_s - plant["delay_s"]
@@ -203,9 +205,12 @@ def misses_as_recorded(
 
 def _axle(drive: Json, way: Way, steered: Array, command: Array, period_s: float) -> tuple[Array, Array]:
     """Headings, (T,), and axles, (T, 3), of a unicycle, from its heading at the start on."""
-    hand, begun, heading = float(drive["hand_point_m"]), 0, float(drive["heading_rad"])
+    hand = float(drive["hand_point_m"])
+    begun = 0
+    heading = float(drive["heading_rad"])
     headings, axles = np.empty(len(steered)), np.empty_like(steered)
-    headings[0], axles[0] = heading, steered[0] - hand * np.array([math.cos(heading), math.sin(heading), 0.0])
+    headings[0] = heading
+    axles[0] = steered[0] - hand * np.array([math.cos(heading), math.sin(heading), 0.0])
     for k in range(1, len(steered)):
         since = way.t_s[k] - way.t_s[begun]
         u = complex(command[k, 0], command[k, 1]) * np.exp(-1j * heading)  # in the frame of the body

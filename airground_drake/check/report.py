@@ -47,11 +47,11 @@ def check_report(folder: Path, limit_s: float, told: Callable[[CheckLine], objec
     report = read_json(folder / "report.json")
     _is_shaped_like_a_report(report)
     is_of_a_size(report["scenario"]["resolved"])
-    found = []
+    lines = []
     for line in _lines(folder, names_in(folder), report, limit_s):
         told(line)
-        found.append(line)
-    return found
+        lines.append(line)
+    return lines
 
 
 def _is_shaped_like_a_report(report: Any) -> None:
@@ -88,10 +88,10 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
         return f"{len(runs[name].t_s)} rows"
 
     def judge(claim: str, name: str) -> str:
-        entries = [each for each in report["claims"] if (each["id"], each["run"]) == (claim, name)]
-        found = DECIDED[claim](runs[name])
-        same("claims that there are", len(entries), int(found is not None), about=claim)
-        return _judged(entries[0], found) if found else "nothing may move"
+        entries = [entry for entry in report["claims"] if (entry["id"], entry["run"]) == (claim, name)]
+        ours = DECIDED[claim](runs[name])
+        same("claims that there are", len(entries), int(ours is not None), about=claim)
+        return _judged(entries[0], ours) if ours else "nothing may move"
 
     for name in report["scenario"]["resolved"]["runs"]:
         yield attempt("trace", name, partial(load, name))
@@ -115,37 +115,38 @@ def check_files(folder: Path, there: Sequence[str], report: Json) -> str:
         held = known is not None and (known[3] is None or known[3] in report["runs"])
         holds("a report has such a file", held, "a file", "nothing", about=name)
     recorded = report["files"]
-    found = {name for name in there if name != "report.json" and not name.startswith(ADDED_LATER)}
-    for name in sorted({*recorded} | found):
-        same("a file is named if it is there", name in recorded, name in found, about=name)
+    present = {name for name in there if name != "report.json" and not name.startswith(ADDED_LATER)}
+    for name in sorted({*recorded} | present):
+        same("a file is named if it is there", name in recorded, name in present, about=name)
         same("SHA-256 of a file", recorded[name], sha256(read_bytes(folder / name)), about=name)
         if name.startswith(OF_THE_MAP):
             read = report["scenario"]["resolved"]["map"]["cells"]["sha256"].values()
             holds(
                 "the map was read from this file", recorded[name] in read, recorded[name], ", ".join(read), about=name
             )
-    return f"{len(found)} files"
+    return f"{len(present)} files"
 
 
-def _judged(claim: Json, found: Found) -> str:
+def _judged(claim: Json, ours: Found) -> str:
     """Compare a recorded verdict with the checker's own."""
     status, margin, count = claim["status"], claim["margin"], claim["exercised"]
-    if found.because is not None and status == "holds":
-        raise found.because
-    same("verdict", status, found.status)
-    if found.because is not None:
-        return f"{status} (broken: {found.because.rule})"
-    if status == "refuted" and found.margin is None:
+    if ours.because is not None and status == "holds":
+        raise ours.because
+    same("verdict", status, ours.status)
+    if ours.because is not None:
+        return f"{status} (broken: {ours.because.rule})"
+    if status == "refuted" and ours.margin is None:
         return str(status)
-    if found.exercised is not None:
-        least, most = found.exercised
-        possible, due = type(count) is int and least <= count <= most, f"{least}, at most {most}"
+    if ours.exercised is not None:
+        least, most = ours.exercised
+        possible = type(count) is int and least <= count <= most
+        due = f"{least}, at most {most}"
         holds("how often the claim was exercised", possible, count, due)
-    if found.margin is None or margin is None:
-        same("margin", margin, found.margin)
+    if ours.margin is None or margin is None:
+        same("margin", margin, ours.margin)
         return str(status)
-    close("margin", margin, found.margin, within=SMALL + 1e-6 * abs(found.margin))
-    return f"{status}, margin {found.margin:.6g} {claim['unit']}".rstrip()
+    close("margin", margin, ours.margin, within=SMALL + 1e-6 * abs(ours.margin))
+    return f"{status}, margin {ours.margin:.6g} {claim['unit']}".rstrip()
 
 
 def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> CheckLine:

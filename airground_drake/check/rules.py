@@ -101,5 +101,5 @@ def _entry(values: Any, k: int | None) -> Any:
     """Entry k along the first axis, as plain numbers; a text, None or a single number is the same for all entries."""
     if values is None or isinstance(values, str) or np.ndim(values) == 0:
         return values.item() if isinstance(values, (np.ndarray, np.generic)) else values
-    found = np.asarray(values).tolist()
-    return found if k is None else found[k]
+    entries = np.asarray(values).tolist()
+    return entries if k is None else entries[k]

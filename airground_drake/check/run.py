@@ -58,11 +58,12 @@ class Run:
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
         """Lower bound of the distance of each pair, m, so that only near pairs are looked at closely."""
-        box, found = {name: boxes_of(place) for name, place in self.body_m.items()}, {}
+        box = {name: boxes_of(place) for name, place in self.body_m.items()}
+        bounds_m = {}
         for pair in self.pairs:
             (low, high), (other_low, other_high) = box[pair.robot], box[pair.other]
-            found[pair.robot, pair.other] = float(pair.shape.bounds_m(low - other_high, high - other_low).min())
-        return found
+            bounds_m[pair.robot, pair.other] = float(pair.shape.bounds_m(low - other_high, high - other_low).min())
+        return bounds_m
 
     @cached_property
     def presets(self) -> dict[str, Preset]:
@@ -144,7 +145,8 @@ class Run:
 
     def period_rows(self, name: str) -> Rows:
         """Ends of the control periods in which a body is there: rows of control samples, and the last row."""
-        rows, there = np.append(self.sample_row, len(self.t_s) - 1), self.there(name)
+        rows = np.append(self.sample_row, len(self.t_s) - 1)
+        there = self.there(name)
         return rows[(rows >= there.start) & (rows < there.stop)]
 
     def _row_at(self, time_s: float) -> int:
@@ -173,8 +175,8 @@ class Run:
 
     def times_s(self, robot: str, kind: str) -> Array:
         """Times of the recorded events of a kind, increasing."""
-        found = [float(event["t_s"]) for event in self.events if (event["robot"], event["kind"]) == (robot, kind)]
-        return np.array(sorted(found))
+        times_s = [float(event["t_s"]) for event in self.events if (event["robot"], event["kind"]) == (robot, kind)]
+        return np.array(sorted(times_s))
 
 
 def column_of(table: pd.DataFrame, name: str) -> Array:
@@ -187,7 +189,8 @@ def column_of(table: pd.DataFrame, name: str) -> Array:
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
     """Read a trace, and check the rules that all claims about it rest on."""
-    scenario, meta = report["scenario"]["resolved"], read_json(folder / "meta.json")
+    scenario = report["scenario"]["resolved"]
+    meta = read_json(folder / "meta.json")
     content = {table: read_bytes(folder / table) for table in TABLES}
     for table in TABLES:
         same("SHA-256 of a table", meta["files"][table], sha256(content[table]), about=table)

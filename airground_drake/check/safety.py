@@ -30,7 +30,8 @@ def safe_trace(run: Run) -> Found:
     # keeps between the points that it steers.
     margin, least, most = np.inf, 0, 0
     for pair in run.pairs:
-        closing, room = pair.closing_m_s * run.scenario["control"]["period_s"], pair.cover_m + pair.more_m
+        closing = pair.closing_m_s * run.scenario["control"]["period_s"]
+        room = pair.cover_m + pair.more_m
         enough = pair.safe_m + max(margin, closing + room + 2.0 * SMALL)
         if run.apart_m[pair.robot, pair.other] - run.bent_m(pair) >= enough:
             continue  # neither the nearest pair nor near enough to count
@@ -47,19 +48,19 @@ def safe_trace(run: Run) -> Found:
 def _least_m(run: Run, pair: Pair, enough: float) -> float:
     """The least distance of a pair, m, at most `enough`; where bodies bend too near, their ways are divided."""
     apart, bent = run.apart(pair), run.bent_m(pair)
-    found = pair.shape.least_m(apart, enough + bent) - bent
-    if not bent or found >= pair.safe_m:
-        return min(found, enough)
+    least_m = pair.shape.least_m(apart, enough + bent) - bent
+    if not bent or least_m >= pair.safe_m:
+        return min(least_m, enough)
     lower = pair.shape.held_m(apart[:-1], apart[:-1], apart[1:], enough + bent)[1] - bent
     too_near = lower < pair.safe_m
     parts = _parts(bent)
     left = bent / parts**2
-    found = min(enough, float(lower[~too_near].min(initial=np.inf)))
+    least_m = min(enough, float(lower[~too_near].min(initial=np.inf)))
     begin = run.there(pair.other).start
-    for k in (each for each in np.argsort(lower).tolist() if too_near[each]):  # others are farther than the nearest
+    for k in (step for step in np.argsort(lower).tolist() if too_near[step]):  # others are farther than the nearest
         fine = run.fine(pair.robot, begin + k, parts) - run.fine(pair.other, begin + k, parts)
-        found = min(found, pair.shape.least_m(fine, found + left, parts) - left)
-    return found
+        least_m = min(least_m, pair.shape.least_m(fine, least_m + left, parts) - left)
+    return least_m
 
 
 def _parts(bent_m: float) -> int:
@@ -76,17 +77,22 @@ def safe_own(run: Run) -> Found | None:
     # claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE says the same.
     if not any(map(expected_m_s, run.scenario["obstacles"].values())):
         return None
-    period, margin, least, most = run.scenario["control"]["period_s"], np.inf, 0, 0
+    period = run.scenario["control"]["period_s"]
+    margin = np.inf
+    least, most = 0, 0
     rows = np.arange(len(run.t_s) - 1)
     sample = run.sample_row[np.searchsorted(run.sample_row, rows, side="right") - 1]
-    ways, bent = {robot: run.body_m[robot] for robot in run.robots}, {name: w.bent_m() for name, w in run.ways.items()}
+    ways = {robot: run.body_m[robot] for robot in run.robots}
+    bent = {name: w.bent_m() for name, w in run.ways.items()}
     step_m = {robot: np.maximum(*(_lengths(way[ends] - way[sample]) for ends in (rows, rows + 1))) + bent[robot]
               for robot, way in ways.items()}  # fmt: skip
     longest = max(float(step.max()) for step in step_m.values())
     for pair in run.pairs:
-        keeps, closing = pair.in_the_law.passive(period).safe_m - pair.cover_m, pair.closing_m_s * period
+        keeps = pair.in_the_law.passive(period).safe_m - pair.cover_m
+        closing = pair.closing_m_s * period
         there = run.there(pair.other)
-        both, reach = rows[there.start : there.stop - 1], keeps + closing + 2.0 * (longest + pair.cover_m)
+        both = rows[there.start : there.stop - 1]
+        reach = keeps + closing + 2.0 * (longest + pair.cover_m)
         if run.apart_m[pair.robot, pair.other] > max(reach, pair.safe_m + longest):
             continue
         apart_m = pair.shape.held_m(run.apart(pair), run.apart(pair), run.apart(pair), np.inf)[0]
@@ -164,8 +170,8 @@ def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: 
     # last: length of the last period, in periods; its step is extended to a whole one.
     periods = len(own_m) - 1
     lasts = [Fraction(1)] * (periods - 1) + [last]
-    found = shortfalls_m(own_m, other_m, pair, [pair.safe_m] * periods, [gain] * periods, lasts)
-    return max((each.both for each in found.values()), default=Fraction())
+    missed = shortfalls_m(own_m, other_m, pair, [pair.safe_m] * periods, [gain] * periods, lasts)
+    return max((shortfall.both for shortfall in missed.values()), default=Fraction())
 
 
 def shortfalls_m(
@@ -179,9 +185,9 @@ def shortfalls_m(
     # lasts: divisors of the steps of each period, (K,); by default 1.
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
     lasts = lasts or [Fraction(1)] * len(reach)
-    reach /= np.array([float(each) for each in lasts])
+    reach /= np.array([float(last) for last in lasts])
     enough = reach + np.asarray(safe_m) + FAR_M
-    share, found = Fraction(pair.share), dict[int, Shortfall]()
+    share, shortfalls = Fraction(pair.share), dict[int, Shortfall]()
     apart = own_m[:-1] - other_m[:-1]
     for bound, part, rows in pair.shape.near(apart):
         if bound >= enough.max():
@@ -196,13 +202,13 @@ def shortfalls_m(
                 (Fraction(safe_m[k]), share, gain[k], len(part.corners) == 1),
                 [a - b for a, b in zip(after, here, strict=True)],
             )
-            own, other = min(_missed_m(away, [each / lasts[k] for each in step], *given) for away in ways), Fraction()
+            own, other = min(_missed_m(away, [axis / lasts[k] for axis in step], *given) for away in ways), Fraction()
             if pair.share < 1.0:  # a robot is a point: there is one way
                 step = [(a - b) / lasts[k] for a, b in zip(beyond, there, strict=True)]
                 other = _missed_m(Away([-c for c in ways[0].vector], ways[0].beyond), step, *given)
-            if own + other > (found[k].both if k in found else 0):
-                found[k] = Shortfall(own, other)
-    return found
+            if own + other > (shortfalls[k].both if k in shortfalls else 0):
+                shortfalls[k] = Shortfall(own, other)
+    return shortfalls
 
 
 def lost_m(missed: Fraction, gain: Fraction, samples: int) -> float:
@@ -240,11 +246,12 @@ def safe_hyp(run: Run) -> Found:
 
 def _constants(run: Run) -> None:
     """A h <= 1, each pair without the passive law starts apart, and the sensing range covers d + (closing speed) h."""
-    control, limit = run.scenario["control"], {name: each["max_speed_m_s"] for name, each in run.robots.items()}
+    control = run.scenario["control"]
+    limit = {name: robot["max_speed_m_s"] for name, robot in run.robots.items()}
     period, reach = written(control["period_s"]), written(control["sensing_range_m"])
     gain = written(control["avoidance_gain_1_s"]) * period
     holds("gain: A h <= 1", gain <= 1, float(gain), "1 at most")
-    for pair in (each.in_the_law for each in run.pairs):
+    for pair in (pair.in_the_law for pair in run.pairs):
         about = f"{pair.robot}, {pair.other}"
         speed = written(limit[pair.robot]) + written(limit.get(pair.other, pair.moves_m_s))
         least = written(pair.safe_m) + speed * period
@@ -296,15 +303,18 @@ def _motion(run: Run) -> None:
             holds("least turning radius", spare >= -SMALL, spare, "0 m at least to spare", about=robot)
         if own := own_of(spec):
             for key, unit in (("drift_m_s", "m/s"), ("cover_m", "m")):
-                found, about = column_of(run.samples, f"{robot}.{key}"), f"{own[key]} {unit} at most"
-                holds(f"declared {key}", found <= own[key] + SMALL, found, about, about=robot, t_s=run.sample_s)
+                speeds = column_of(run.samples, f"{robot}.{key}")
+                about = f"{own[key]} {unit} at most"
+                holds(f"declared {key}", speeds <= own[key] + SMALL, speeds, about, about=robot, t_s=run.sample_s)
         speed = np.linalg.norm(run.sampled(robot, "v", "m_s"), axis=1)
-        slow, most = speed <= spec["max_speed_m_s"] + SMALL, f"{spec['max_speed_m_s']} at most"
+        slow = speed <= spec["max_speed_m_s"] + SMALL
+        most = f"{spec['max_speed_m_s']} at most"
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)
         if robot != run.uav:
             close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)
     for name in run.moving:
-        rows, expected = run.period_rows(name), expected_m_s(run.scenario["obstacles"][name])
+        rows = run.period_rows(name)
+        expected = expected_m_s(run.scenario["obstacles"][name])
         speed = np.linalg.norm(np.diff(run.position_m[name][rows], axis=0), axis=1) / np.diff(run.t_s[rows])
         slow = speed <= expected + SMALL / run.scenario["control"]["period_s"]
         holds("declared speed", slow, speed, f"{expected} at most", about=name, t_s=run.t_s[rows[:-1]])

@@ -101,18 +101,18 @@ def robots_of(scenario: Json) -> dict[str, Json]:
 
 def barriers_of(scenario: Json) -> dict[str, Json]:
     """The obstacles, and the map and the walls of the arena as entries like theirs, by name."""
-    found: dict[str, Json] = dict(scenario["obstacles"])
+    barriers: dict[str, Json] = dict(scenario["obstacles"])
     keys = ("heading_rad", "radius_m", "distance_m", "appears_s", "disappears_s", "max_speed_m_s")
     numbers = dict.fromkeys(keys, 0.0) | {"moves": None}
     if scenario["map"] and scenario["map"]["cells"]["rectangles"]:
-        found["map"] = numbers | scenario["map"]
+        barriers["map"] = numbers | scenario["map"]
     if not scenario["arena_m"]:
-        return found
+        return barriers
     (west, east), (south, north) = (sorted(axis) for axis in zip(*scenario["arena_m"], strict=True))
     around = [[west, south], [east, south], [east, north], [west, north], [west, south]]
     walls = zip(("south", "east", "north", "west"), pairwise(around), strict=True)
     wall = numbers | {"height_m": ENDLESS_M, "position_m": []}
-    return found | {f"arena_{side}": wall | {"segment_m": [*corners]} for side, corners in walls}
+    return barriers | {f"arena_{side}": wall | {"segment_m": [*corners]} for side, corners in walls}
 
 
 def moving_of(scenario: Json) -> list[str]:
@@ -167,30 +167,30 @@ def pairs_of(scenario: Json) -> list[Pair]:
                 for robot in of
             ]
     beside_robots = []
-    for one, other in combinations(robots, 2):
-        gap_m = safe["air_ground_m" if other == uav else "ugv_m"]
-        radii = radii_m(robots[one], robots[other])
-        beside_robots.append(Pair(one, other, gap_m, radii, limit[one] + limit[other], 0.5))
+    for first, second in combinations(robots, 2):
+        gap_m = safe["air_ground_m" if second == uav else "ugv_m"]
+        radii = radii_m(robots[first], robots[second])
+        beside_robots.append(Pair(first, second, gap_m, radii, limit[first] + limit[second], 0.5))
     room = {name: taken(robot, scenario["control"]) for name, robot in robots.items()}
     return [_with_plants(pair, room) for pair in beside_obstacles + beside_robots]
 
 
 def _with_plants(pair: Pair, room: dict[str, Taken]) -> Pair:
     """A pair with what the plants of its robots take."""
-    one, other = room[pair.robot], room.get(pair.other)
-    both = [each for each in (one, other) if each]
-    cover, drift = sum(each.cover_m + each.slip_m for each in both), sum(each.drift_m for each in both)
+    own, other = room[pair.robot], room.get(pair.other)
+    both = [plant for plant in (own, other) if plant]
+    cover, drift = sum(plant.cover_m + plant.slip_m for plant in both), sum(plant.drift_m for plant in both)
     if not cover:
         return pair
-    more = law_m(pair.safe_m, one, other, passive=pair.moves_m_s > 0.0) - pair.safe_m
-    late = any(each.lag_s or each.delay_s for each in both) or (one.drawn_m and not other)
-    start_s = max(each.delay_s for each in both) if late and not pair.moves_m_s else None
-    return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=one.slip_m, start_s=start_s)
+    more = law_m(pair.safe_m, own, other, passive=pair.moves_m_s > 0.0) - pair.safe_m
+    late = any(plant.lag_s or plant.delay_s for plant in both) or (own.drawn_m and not other)
+    start_s = max(plant.delay_s for plant in both) if late and not pair.moves_m_s else None
+    return pair._replace(more_m=more, cover_m=cover, drift_m=drift, slip_m=own.slip_m, start_s=start_s)
 
 
-def radii_m(one: Json, other: Json) -> float:
+def radii_m(own: Json, other: Json) -> float:
     """Sum of the radii of two bodies, m."""
-    return float(one["radius_m"]) + float(other["radius_m"])
+    return float(own["radius_m"]) + float(other["radius_m"])
 
 
 def preset_of(scenario: Json, ugv: str) -> Preset:

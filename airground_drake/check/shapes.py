@@ -63,16 +63,16 @@ class Part:
     def between_m(self, start: Array, end: Array, at_m: tuple[Array, Array], reach_m: float) -> Array:
         """Least signed distances on straight steps from `start` to `end`, (K, 3), where below `reach_m`: (K,), m."""
         # reach_m: of a step that stays beyond it, the result may be too large.
-        step, found = end - start, np.minimum(*at_m)
+        step, least_m = end - start, np.minimum(*at_m)
         bound = 0.5 * (at_m[0] + at_m[1] - np.linalg.norm(step, axis=1)) - ROUNDING_M
-        k = np.flatnonzero(~(bound >= reach_m))
-        low, high = np.zeros(len(k)), np.ones(len(k))
-        for _ in range(THIRDS if len(k) else 0):  # a convex function has its least value beside the lower of two
-            one, two = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
-            first, second = (self.signed_m(start[k] + s[:, None] * step[k]) for s in (one, two))
-            found[k] = np.minimum(found[k], np.minimum(first, second))
-            low, high = np.where(first < second, low, one), np.where(first < second, two, high)
-        return found
+        steps = np.flatnonzero(~(bound >= reach_m))
+        low, high = np.zeros(len(steps)), np.ones(len(steps))
+        for _ in range(THIRDS if len(steps) else 0):  # a convex function has its least value beside the lower of two
+            left, right = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
+            first, second = (self.signed_m(start[steps] + s[:, None] * step[steps]) for s in (left, right))
+            least_m[steps] = np.minimum(least_m[steps], np.minimum(first, second))
+            low, high = np.where(first < second, low, left), np.where(first < second, right, high)
+        return least_m
 
     def along_m(self, places: Array, at_m: Array, reach_m: float) -> Array:
         """Least signed distances on the steps from place to place, (K - 1,); `at_m` has those of all places, (K,)."""
@@ -81,7 +81,9 @@ class Part:
     def away(self, place: Sequence[Fraction]) -> list[Away]:
         """Exactly, from the nearest point outside, and from the nearest faces inside; equally near ones all do."""
         x, y, z = place
-        height, offsets, faces = Fraction(), [], []
+        height = Fraction()
+        offsets = []
+        faces = []
         if math.isfinite(self.top_m):
             over, under = z - Fraction(self.top_m), Fraction(self.base_m) - z
             height = max(over, Fraction()) - max(under, Fraction())
@@ -93,8 +95,8 @@ class Part:
             offsets.append(Away(offset, sum((c * c for c in offset), Fraction())))
             faces.append(Away([ey, -ex, Fraction()], px * ey - py * ex))
         if len(offsets) < 3 or any(face.beyond > 0 for face in faces[-len(offsets) :]):
-            return [min(offsets, key=lambda each: each.beyond)]
-        depths = [float(each.beyond) / math.hypot(*map(float, each.vector)) for each in faces]
+            return [min(offsets, key=lambda offset: offset.beyond)]
+        depths = [float(face.beyond) / math.hypot(*map(float, face.vector)) for face in faces]
         return [face for face, depth in zip(faces, depths, strict=True) if depth >= max(depths) - TIE_M]
 
 
@@ -248,7 +250,7 @@ def _is_convex(corners: Sequence[Corner]) -> bool:
 
 def _ears(corners: Sequence[Corner]) -> list[list[Corner]]:
     """Triangles that turn left, with no other corner in them."""
-    left, found = [*corners], []
+    left, ears = [*corners], []
     while len(left) > 2:
         points = np.array(left)
         for k in range(len(left)):
@@ -257,9 +259,9 @@ def _ears(corners: Sequence[Corner]) -> list[list[Corner]]:
                 break
         else:
             raise NotEstablished("a polygon has convex parts", f"{left} has no ear", f"{corners}")
-        found.append(ear)
+        ears.append(ear)
         del left[k - 1]
-    return found
+    return ears
 
 
 def _surrounds(ear: list[Corner], points: Array) -> bool:
@@ -269,11 +271,11 @@ def _surrounds(ear: list[Corner], points: Array) -> bool:
     return any((x, y) not in ear for x, y in points[inside].tolist())
 
 
-def _union(one: list[Corner], other: list[Corner]) -> list[Corner] | None:
+def _union(part: list[Corner], other: list[Corner]) -> list[Corner] | None:
     """The union of two parts that share an edge, if it is convex."""
-    for a, b in edges_of(one):
+    for a, b in edges_of(part):
         if (b, a) in edges_of(other):
-            k, m = one.index(b), other.index(a)
-            both = [*one[k:], *one[:k], *[*other[m:], *other[:m]][1:-1]]
+            k, m = part.index(b), other.index(a)
+            both = [*part[k:], *part[:k], *[*other[m:], *other[:m]][1:-1]]
             return both if _is_convex(both) else None
     return None

@@ -101,23 +101,23 @@ def automaton(x: Variable, levels: Levels) -> list[Step]:
     # It triggers when x reaches zeta while supervising, also at t = 0; it releases when x falls below the release
     # level. A release before the dwell after the trigger is over leads to a rest until then, and a trigger at its end
     # if x is still at zeta or above.
-    found: list[Step] = []
+    steps: list[Step] = []
     trigger = float(x.t_s[0]) if x.x_m[0] >= levels.zeta_m else x.reaches(levels.zeta_m, float(x.t_s[0]), above=True)
     while trigger is not None:
-        found.append(Step(trigger, "trigger", INTERVENING))
+        steps.append(Step(trigger, "trigger", INTERVENING))
         release, rested = x.reaches(levels.release_m, trigger, above=False), trigger + levels.dwell_s
         if release is None:
             break
-        found.append(Step(release, "release", REFRACTORY if release < rested else SUPERVISING))
+        steps.append(Step(release, "release", REFRACTORY if release < rested else SUPERVISING))
         if release >= rested:
             trigger = x.reaches(levels.zeta_m, release, above=True)
         elif rested > x.t_s[-1]:
             break
         else:
-            found.append(Step(rested, "", SUPERVISING))
+            steps.append(Step(rested, "", SUPERVISING))
             still_above = x.at(rested) >= levels.zeta_m
             trigger = rested if still_above else x.reaches(levels.zeta_m, rested, above=True)
-    return found
+    return steps
 
 
 def thr_trig(run: Run) -> Found:
@@ -145,8 +145,8 @@ def thr_trig(run: Run) -> Found:
 def _transitions(steps: list[Step], before_s: float, at_once_s: float) -> int:
     """Number of transitions before a time; the end of a rest and a trigger within `at_once_s` of it count as one."""
     ends_of_a_rest_with_a_trigger = sum(
-        one.event == "" and other.event == "trigger" and other.t_s - one.t_s <= at_once_s
-        for one, other in pairwise(steps)
+        before.event == "" and after.event == "trigger" and after.t_s - before.t_s <= at_once_s
+        for before, after in pairwise(steps)
     )
     return sum(step.t_s < before_s for step in steps) - ends_of_a_rest_with_a_trigger
 
@@ -180,7 +180,9 @@ def _modes_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> None:
 
 def _noise_moves_as_it_must(run: Run, ugv: str) -> None:
     """(15) from 0: from row to row by Euler's method, with one sample for each period of the noise."""
-    decision, noise, end = run.scenario["decision"], run.column(f"{ugv}.noise_m"), run.t_s[1:]
+    decision = run.scenario["decision"]
+    noise = run.column(f"{ugv}.noise_m")
+    end = run.t_s[1:]
     close("noise at the start", noise[0], 0.0, within=NOISE_M, about=ugv, t_s=float(run.t_s[0]))
     step = np.diff(run.t_s)
     driven = noise[1:] - noise[:-1] * (1.0 - decision["leak_1_s"] * step)
@@ -233,17 +235,17 @@ def _off_m(
         if trigger is None and begin_s >= end_s:  # the dwell outlasts the run
             return
         until = end_s if trigger is None else trigger
-        found = list(_excursions(error, levels, min(begin_s, until), until))
-        serves = trigger is not None and bool(found) and found[-1][1] == until
-        missed = [_largest(error, *each) - levels.zeta_m for each in (found[:-1] if serves else found)]
+        excursions = list(_excursions(error, levels, min(begin_s, until), until))
+        serves = trigger is not None and bool(excursions) and excursions[-1][1] == until
+        missed = [_largest(error, *span) - levels.zeta_m for span in (excursions[:-1] if serves else excursions)]
         yield from (above for above in missed if above > tolerance)
         if trigger is None:
             continue
         if not serves:
             yield max(levels.zeta_m - error.at(trigger), 0.0)
         else:
-            late = trigger - found[-1][0] > EVENT_S
-            yield max(_largest(error, found[-1][0], trigger) - levels.zeta_m, 0.0) if late else 0.0
+            late = trigger - excursions[-1][0] > EVENT_S
+            yield max(_largest(error, excursions[-1][0], trigger) - levels.zeta_m, 0.0) if late else 0.0
         after = [release for release in releases if release >= trigger]
         if not after:  # triggered to the end
             return

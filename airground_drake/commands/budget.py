@@ -46,19 +46,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(json.dumps([_entry(group) for group in groups], indent=1))
         return 0
     for group in groups:
-        one = group[0]
-        print(f"{_about(group)}: promised {one.promised_m:.3f} m, in the law {one.gap_m:.3f} m")
-        for term in one.terms:
+        pair = group[0]
+        print(f"{_about(group)}: promised {pair.promised_m:.3f} m, in the law {pair.gap_m:.3f} m")
+        for term in pair.terms:
             owner = f" of {term.of}" if term.of and len(group) == 1 else ""
             print(f"    {term.key}{owner}: {term.metres:.4f} m")
-        if one.start:
-            print(f"    promised only with {one.start}")
+        if pair.start:
+            print(f"    promised only with {pair.start}")
     return 0
 
 
 def _about(group: Sequence[PairBudget]) -> str:
     """The pairs of a group in words."""
-    first, second = (list(dict.fromkeys(getattr(each, name) for each in group)) for name in ("first", "second"))
+    first, second = (list(dict.fromkeys(getattr(pair, name) for pair in group)) for name in ("first", "second"))
     kind = group[0].kind
     if kind == "ugv":
         return f"two UGVs ({_named([*dict.fromkeys([*first, *second])])})"
@@ -74,12 +74,12 @@ def _named(names: Sequence[str]) -> str:
 
 
 def _entry(group: Sequence[PairBudget]) -> dict[str, object]:
-    one = group[0]
+    pair = group[0]
     return {
-        "kind": one.kind,
-        "pairs": [[each.first, each.second] for each in group],
-        "promised_m": one.promised_m,
-        "in_the_law_m": one.gap_m,
-        "terms": [{"key": term.key, "metres": term.metres} for term in one.terms],
-        **({"promised_only_with": one.start} if one.start else {}),
+        "kind": pair.kind,
+        "pairs": [[member.first, member.second] for member in group],
+        "promised_m": pair.promised_m,
+        "in_the_law_m": pair.gap_m,
+        "terms": [{"key": term.key, "metres": term.metres} for term in pair.terms],
+        **({"promised_only_with": pair.start} if pair.start else {}),
     }

@@ -77,12 +77,12 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
         progress_bar(quiet=options.quiet) as progress,
         pool.cluster(options.scheduler) if options.scheduler else pool.local(jobs) as processes,
     ):
-        found = conduct(
+        result = conduct(
             spec, folder, processes, options.number, resume=options.resume, stopping=stopping,
             limits=_limits(options), engine=options.engine, progress=progress,
         )  # fmt: skip
-    print(f"{_summary(found, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
-    return _code(found)
+    print(f"{_summary(result, looked=bool(options.stop_when or options.resume))}\n{one_line(str(folder))}")
+    return _code(result)
 
 
 def _only(spec: Spec, options: argparse.Namespace) -> int:
@@ -107,44 +107,44 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
         print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
     print(f"airground report {argument(path)}")
-    found = evidence(table_of(rows))
-    for what in _undecided(found):
+    result = evidence(table_of(rows))
+    for what in _undecided(result):
         print(f"undecided: {what}")
-    return _code(found)
+    return _code(result)
 
 
 def _limits(options: argparse.Namespace) -> Limits:
     return Limits(options.limit_steps, DEFAULT_LIMITS.memory, options.limit_time, options.allow_plugins)
 
 
-def _code(found: dict[str, Any]) -> int:
-    if any(claim["differs"] for claim in found["claims"]):
+def _code(result: dict[str, Any]) -> int:
+    if any(claim["differs"] for claim in result["claims"]):
         return EXIT_REFUTED
-    return EXIT_UNDECIDED if _undecided(found) else 0
+    return EXIT_UNDECIDED if _undecided(result) else 0
 
 
-def _undecided(found: dict[str, Any]) -> list[str]:
+def _undecided(result: dict[str, Any]) -> list[str]:
     """The reasons of exit code 3, in words."""
-    draws, ended = found["draws"], found["ended"]
+    draws, ended = result["draws"], result["ended"]
     lines = [f"{ended[name]} of {draws} draws {name}" for name in UNFINISHED if name in ended]
-    for claim in found["claims"]:
+    for claim in result["claims"]:
         if claim["undecided_draws"]:
             draws = ", ".join(map(str, claim["undecided_draws"]))
             lines.append(f"{_name(claim)}: {claim['undecided']} of {claim['tested']} runs, such as draw {draws}")
         elif claim["untested"]:
             lines.append(f"{_name(claim)}: the scenario expects it to be tested, and no draw did")
-    return lines if found["claims"] else [*lines, "nothing was judged"]
+    return lines if result["claims"] else [*lines, "nothing was judged"]
 
 
 def _name(claim: dict[str, Any]) -> str:
     return f"{claim['claim']} in run {claim['run']}"
 
 
-def _summary(found: dict[str, Any], *, looked: bool) -> str:
+def _summary(result: dict[str, Any], *, looked: bool) -> str:
     """The evidence as text. After intermediate looks only the anytime-valid bounds hold, so these are given then."""
-    ended = ", ".join(f"{count} {name}" for name, count in found["ended"].items())
-    lines = [f"{found['name']}: {found['draws']} draws ({ended}), {found['simulated_s']:.0f} s simulated"]
-    for claim in found["claims"]:
+    ended = ", ".join(f"{count} {name}" for name, count in result["ended"].items())
+    lines = [f"{result['name']}: {result['draws']} draws ({ended}), {result['simulated_s']:.0f} s simulated"]
+    for claim in result["claims"]:
         said = f"{claim['refuted']} of {claim['tested']} refuted"
         if not claim["tested"]:
             said += ", never put to the test"
@@ -152,14 +152,14 @@ def _summary(found: dict[str, Any], *, looked: bool) -> str:
             said += f", probability of a violation {bounds[0]:.2g} to {bounds[1]:.2g}"
         differs = f"; {claim['differs']} not as expected" if claim["differs"] else ""
         lines.append(f"  {claim['run']:10} {claim['claim']:12} {said}{differs}")
-    for swept in found.get("swept", ()):
+    for swept in result.get("swept", ()):
         lines += [f"  by {swept['key']}:", *map(_by_value, swept["entries"])]
-    if found["dependent"]:
-        lines.append(f"  no intervals: draws are not independent ({', '.join(found['dependent'])})")
-    if found["not_judged"]:
-        first = found["not_judged"][0]
+    if result["dependent"]:
+        lines.append(f"  no intervals: draws are not independent ({', '.join(result['dependent'])})")
+    if result["not_judged"]:
+        first = result["not_judged"][0]
         lines.append(f"  first that was not judged: draw {first['index']}, {first['ended']}: {first['what']}")
-    return "\n".join([*lines, *(f"  undecided: {what}" for what in _undecided(found))])
+    return "\n".join([*lines, *(f"  undecided: {what}" for what in _undecided(result))])
 
 
 def _by_value(entry: dict[str, Any]) -> str:
@@ -170,9 +170,7 @@ def _by_value(entry: dict[str, Any]) -> str:
         for name, words in (("first_trigger_s", "first trigger"), ("arrival_s", "last arrival"))
         if entry[name] is not None
     ]
-    said = [
-        f"{entry['arrived']} of {entry['ugvs']} arrived",
-        *times,
-        *([f"refuted: {', '.join(refuted)}"] * bool(refuted)),
-    ]
+    said = [f"{entry['arrived']} of {entry['ugvs']} arrived", *times]
+    if refuted:
+        said.append(f"refuted: {', '.join(refuted)}")
     return f"    {entry['value']!s:10} {entry['run']:10} {'; '.join(said)}"

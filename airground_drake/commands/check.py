@@ -60,12 +60,12 @@ Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 3 not reproduced here
 def parser() -> argparse.ArgumentParser:
     """Make the parser: that of the checker, and further options."""
     says = "Check a report from its files alone; with --simulate, simulate its runs again."
-    found = checker.parser("airground check", says, EPILOG)
-    found.add_argument("--simulate", action="store_true", help="simulate the runs again: all tables must agree exactly")
-    found.add_argument(plugins.OPTION, action="store_true", help="with --simulate: import and run third-party code")
-    found.add_argument("--coq", action="store_true", help="prove the safety of the runs again with Coq")
-    found.add_argument("-q", "--quiet", action="store_true", help="no progress")
-    return found
+    made = checker.parser("airground check", says, EPILOG)
+    made.add_argument("--simulate", action="store_true", help="simulate the runs again: all tables must agree exactly")
+    made.add_argument(plugins.OPTION, action="store_true", help="with --simulate: import and run third-party code")
+    made.add_argument("--coq", action="store_true", help="prove the safety of the runs again with Coq")
+    made.add_argument("-q", "--quiet", action="store_true", help="no progress")
+    return made
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -100,7 +100,7 @@ def made_again(
     from airground_drake.report.lines import JUDGED
 
     line = partial(CheckLine, by=by)
-    if any(each.outcome != AGREES for each in lines if each.claim in NEEDED):
+    if any(check.outcome != AGREES for check in lines if check.claim in NEEDED):
         yield line("report", "", OPEN, f"not {by}, since a check above failed", "the files are the report's")
         return
     progress.stage(by)
@@ -109,11 +109,11 @@ def made_again(
         tempfile.TemporaryFile("w+") as said,
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True) as process,
     ):
-        for found in map(json.loads, process.stdout or ()):
-            if JUDGED in found:
-                progress.advance(1.0, found[JUDGED])
+        for entry in map(json.loads, process.stdout or ()):
+            if JUDGED in entry:
+                progress.advance(1.0, entry[JUDGED])
             else:
-                yield line(**found)
+                yield line(**entry)
         if process.wait():
             said.seek(0)
             why = said.read().strip().splitlines()[-1:] or [f"its process ended with {process.returncode}"]
@@ -127,7 +127,7 @@ def _proved_again(folder: Path, lines: Sequence[CheckLine]) -> Iterator[CheckLin
     from airground_drake.check.rules import Disagreement, NotEstablished
 
     line = partial(CheckLine, "proofs", by="Coq")
-    if any(each.outcome != AGREES for each in lines if each.claim in NEEDED):
+    if any(check.outcome != AGREES for check in lines if check.claim in NEEDED):
         yield line("", OPEN, "not proved again, since a check above failed", "the files are the report's")
         return
     with files.temporary_folder() as copy:
@@ -136,14 +136,14 @@ def _proved_again(folder: Path, lines: Sequence[CheckLine]) -> Iterator[CheckLin
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         there = folder / "proofs" / "proofs.json"
         try:
-            found = read_json(copy / "proofs" / "proofs.json") if done.returncode < EXIT_UNUSABLE else {"runs": {}}
+            proofs = read_json(copy / "proofs" / "proofs.json") if done.returncode < EXIT_UNUSABLE else {"runs": {}}
             recorded = read_json(there)["runs"] if there.exists() else {}
         except (Disagreement, NotEstablished, KeyError, TypeError) as error:
             yield line("", OPEN, f"what Coq found cannot be read: {error}", "what Coq found can be read")
             return
-    for run, entry in found["runs"].items():
+    for run, entry in proofs["runs"].items():
         yield _compared(run, entry, recorded.get(run))
-    if not found["runs"]:
+    if not proofs["runs"]:
         yield line("", OPEN, (done.stderr.strip().splitlines() or ["Coq said nothing"])[-1], "Coq can be asked")
 
 
@@ -158,7 +158,7 @@ def _compared(run: str, entry: Any, recorded: Any) -> CheckLine:
     says = f"{words}every distance is kept; the law {'is obeyed without error' if law else 'is not proved'}"
     if recorded is None:
         says += "; the report has no proof of this run"
-    elif differing := [each for each in differences(recorded, entry) if not each[0].endswith((".seconds", ".why"))]:
+    elif differing := [item for item in differences(recorded, entry) if not item[0].endswith((".seconds", ".why"))]:
         about, theirs, ours = differing[0]
         says = f"Coq here: {about} is {short(ours)}; recorded {short(theirs)}"
         return line(DISAGREES, says, "proofs.json says what Coq finds", about, recorded=theirs, recomputed=ours)

@@ -11,6 +11,7 @@ from airground_drake.base import files
 from airground_drake.base.errors import one_line, short
 from airground_drake.base.usage import output_file
 from airground_drake.report import compare
+from airground_drake.report.sentences import counted
 from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
@@ -47,25 +48,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.report import model
 
     before, after = model.read(options.before), model.read(options.after)
-    found = compare.compared(before, after)
+    changed = compare.compared(before, after)
     if options.html is not None:
-        page = _page((options.before, options.after), before, after, found)
+        page = _page((options.before, options.after), before, after, changed)
         with files.wanted(options.html, "a file for the page"):
             files.write_text(options.html, page)
     if options.json:
         places = {"schema": compare.SCHEMA, "before": str(options.before), "after": str(options.after)}
-        print(json.dumps({**places, **found}, indent=1, allow_nan=False))
+        print(json.dumps({**places, **changed}, indent=1, allow_nan=False))
     else:
-        print("\n".join(one_line(line) for line in _lines(found)))
-    differs = any(found[part] for part in PARTS[1:])
-    return EXIT_WORSE if found["regressions"] or (options.exact and differs) else 0
+        print("\n".join(one_line(line) for line in _lines(changed)))
+    differs = any(changed[part] for part in PARTS[1:])
+    return EXIT_WORSE if changed["regressions"] or (options.exact and differs) else 0
 
 
-def _lines(found: Mapping[str, Any]) -> Iterator[str]:
+def _lines(changes_of: Mapping[str, Any]) -> Iterator[str]:
     changed, rounded = [], 0
     for part in PARTS:
-        hidden = compare.rounded(found, part)
-        changes = sorted((each for each in found[part] if each not in hidden), key=lambda each: not each.get("worse"))
+        hidden = compare.rounded(changes_of, part)
+        changes = [change for change in changes_of[part] if change not in hidden]
+        changes.sort(key=lambda change: not change.get("worse"))
         rounded += len(hidden)
         if changes:
             changed.append(f"{len(changes)} {part}")
@@ -74,10 +76,10 @@ def _lines(found: Mapping[str, Any]) -> Iterator[str]:
         if len(changes) > MOST_LINES:
             yield f"  and {len(changes) - MOST_LINES} more: --json has all"
     if rounded:
-        yield f"{rounded} number{'' if rounded == 1 else 's'} changed by no more than rounding: --json has all"
-    count = found["regressions"]
+        yield f"{counted(rounded, 'number')} changed by no more than rounding: --json has all"
+    count = changes_of["regressions"]
     said = ", ".join(changed) or ("nothing else" if rounded else "nothing")
-    yield f"{said} changed; {count or 'no'} regression{'' if count == 1 else 's'}"
+    yield f"{said} changed; {counted(count, 'regression') if count else 'no regressions'}"
 
 
 def _line(change: Mapping[str, Any]) -> str:
@@ -100,18 +102,18 @@ def _side(value: Any) -> str:
     return f"{value:.9g}" if isinstance(value, float) else "none" if value is None else str(value)
 
 
-def _page(folders: tuple[Path, Path], before: Report, after: Report, found: Mapping[str, Any]) -> str:
+def _page(folders: tuple[Path, Path], before: Report, after: Report, changed: Mapping[str, Any]) -> str:
     """The comparison as a page."""
     from airground_drake.report.html import render_beside
 
     worse = [
         _line(change).removeprefix("worse: ")
         for part in (*PARTS[2:], PARTS[1])
-        for change in found[part]
+        for change in changed[part]
         if change["worse"]
     ]
     return render_beside(
-        "compare.html.j2", before=before, after=after, found=found, parts=PARTS, most=MOST_ROWS, regressions=worse,
-        rounded={part: compare.rounded(found, part) for part in PARTS},
+        "compare.html.j2", before=before, after=after, found=changed, parts=PARTS, most=MOST_ROWS, regressions=worse,
+        rounded={part: compare.rounded(changed, part) for part in PARTS},
         places=[str(folder) for folder in folders],
     )  # fmt: skip

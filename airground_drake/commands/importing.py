@@ -99,7 +99,7 @@ def _imported(options: argparse.Namespace) -> Imported:
         return imported.mapf(path, options.map, name, folder, options.agents or AGENTS, cell_m, speed)
     radius_m, distance_m = options.radius_m or RADII_M[options.format], options.distance_m or DISTANCE_M
     sizes = imported.Sizes(radius_m, distance_m, speed)
-    robots = [imported.Robot(*each) for each in options.ugv or ()]
+    robots = [imported.Robot(*robot) for robot in options.ugv or ()]
     if options.format == "barn":
         return imported.barn(path, name, robots, sizes, options.height_m or HEIGHT_M)
     return imported.ros_map(path, name, folder, robots, options.ugvs or UGVS, sizes)

@@ -42,9 +42,9 @@ def _write(place: Path) -> Path:
     below = sorted(path.parent for path in place.glob("**/report.json") if path.parent != place)
     entries: list[dict[str, Any]] = []
     problems = []
-    for each in filter(folder.is_report, below):
+    for report in filter(folder.is_report, below):
         try:
-            entries.append(_entry(each, place, f"run-{len(entries)}"))
+            entries.append(_entry(report, place, f"run-{len(entries)}"))
         except (ReportError, FolderError) as error:
             problems.append(str(error))
     if not entries:
@@ -60,14 +60,14 @@ def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
     """Return the values that the page shows of a report; ReportError or FolderError if it cannot be used."""
     from airground_drake.report import model
 
-    found = model.read(report)
+    content = model.read(report)
     files.refuse_links(report)
     leads_to = report / (folder.PAGES["html"] if (report / folder.PAGES["html"]).is_file() else folder.PAGES["json"])
     where = report.relative_to(place).as_posix()
     link = quote(os.fsencode(leads_to.relative_to(place)))
     return {
-        "scenario": found.scenario, "overall": found.overall, "provenance": found.provenance, "place": where,
-        "link": link, "headline": _headline(found), "thumbnail": _thumbnail(report, found, prefix),
+        "scenario": content.scenario, "overall": content.overall, "provenance": content.provenance, "place": where,
+        "link": link, "headline": _headline(content), "thumbnail": _thumbnail(report, content, prefix),
     }  # fmt: skip
 
 

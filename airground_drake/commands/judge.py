@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     document = resolved(scenario)
     rename = dict(options.rename)
     choice = tracks.Choice(
-        rename, [each.strip("/") for each in options.frame], options.without, options.uav, options.gap,
+        rename, [frame.strip("/") for frame in options.frame], options.without, options.uav, options.gap,
         options.time_unit, options.length_unit, options.rate_hz, dict(options.axes),
     )  # fmt: skip
     bodies = tracks.bodies_of(document, options.uav)
@@ -93,20 +93,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.rate_hz and options.time_unit:
         return refuse("--rate-hz is for times that are numbers of frames, --time-unit for others: use one of the two")
     log = opening.opened(options.logs, tables.Wanted(bodies, rename, options.map_columns))
-    found = tracks.joined(log, document, choice)
+    joined = tracks.joined(log, document, choice)
     errors = _errors(options.position_error, bodies)
-    judged = judging.judge(found, document, errors)
+    judged = judging.judge(joined, document, errors)
     if options.output is not None:
         from airground_drake.commands.saved import outside_reports
         from airground_drake.study.logs import page
 
         outside_reports(options.output, "the page")
         logs = [str(path) for path in options.logs]
-        written = page.write(options.output, judged, found, scenario, errors, logs)
+        written = page.write(options.output, judged, joined, scenario, errors, logs)
     if options.json:
-        print(json.dumps(judging.as_json(judged, found), indent=1, allow_nan=False))
+        print(json.dumps(judging.as_json(judged, joined), indent=1, allow_nan=False))
     else:
-        for line in words.lines(judged, found):
+        for line in words.lines(judged, joined):
             print(one_line(line))
         if options.output is not None:
             print("".join(f"{one_line(str(path))}\n" for path in written), end="")
@@ -135,16 +135,16 @@ def _axes(text: str) -> tuple[str, str]:
 def _mapped(text: str) -> dict[str, str]:
     from airground_drake.study.logs.columns import TARGETS, split_unit
 
-    found = dict[str, str]()
+    names = dict[str, str]()
     for part in text.split(","):
         target, _, name = part.partition("=")
         if split_unit(target)[0] not in TARGETS or not name:
             wanted = f"wanted: t=NAME,body=NAME,x=NAME,... of {', '.join(TARGETS)}, with a unit where needed: x_mm=NAME"
             raise argparse.ArgumentTypeError(f"{part!r} is not allowed; {wanted}")
-        if any(split_unit(each)[0] == split_unit(target)[0] for each in found):
+        if any(split_unit(known)[0] == split_unit(target)[0] for known in names):
             raise argparse.ArgumentTypeError(f"{text!r} is not allowed; wanted: one name for {split_unit(target)[0]}")
-        found[target] = name
-    return found
+        names[target] = name
+    return names
 
 
 def _error(text: str) -> tuple[str, float]:

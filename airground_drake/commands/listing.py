@@ -46,9 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.name is not None:
         return _print_one(options.kind, options.name)
     for kind in KINDS if options.kind is None else (options.kind,):
-        found = list(KINDS[kind]())
-        width = max(len(name) for name, _ in found)
-        print("\n".join([f"{kind}:", *(f"  {name:{width}}  {says}".rstrip() for name, says in found)]))
+        entries = list(KINDS[kind]())
+        width = max(len(name) for name, _ in entries)
+        print("\n".join([f"{kind}:", *(f"  {name:{width}}  {says}".rstrip() for name, says in entries)]))
     return 0
 
 
@@ -57,9 +57,9 @@ def _print_one(kind: str, name: str) -> int:
     names = dict(KINDS[kind]())
     if name not in names:
         raise UnknownNameError(f"name among the {kind}", name, names)
-    registry = next((each for each in REGISTRIES.get(kind, ()) if name in each), None)
+    registry = next((registry for registry in REGISTRIES.get(kind, ()) if name in registry), None)
     lines = [f"{name}: {names[name]}"] if registry is None else _about(registry.load(name, of=object), name)
-    print("\n".join(line for each in lines for line in (textwrap.wrap(each, WIDTH, subsequent_indent="  ") or [""])))
+    print("\n".join(line for text in lines for line in (textwrap.wrap(text, WIDTH, subsequent_indent="  ") or [""])))
     return 0
 
 
@@ -69,7 +69,7 @@ def _about(kind: type, name: str) -> list[str]:
         claim: Any = kind
         return [
             f"{name}: {claim.summary}", statement, f"Decided by: {claim.method}", "Assumes:",
-            *(f"- {each}" for each in claim.assumptions), f"Does not establish: {claim.does_not_establish}",
+            *(f"- {assumption}" for assumption in claim.assumptions), f"Does not establish: {claim.does_not_establish}",
         ]  # fmt: skip
     told, _, more = (inspect.getdoc(kind) or "").partition("\n\n")
     given = ", ".join(parameters(kind)) or "none"
@@ -81,15 +81,15 @@ def _print_keys(beginning: str) -> int:
     from airground_drake.scenario.json_schema import scenario_schema
     from airground_drake.scenario.keys import sections
 
-    found = [
+    entries = [
         (f"{section.path}.{entry.key}".lstrip("."), entry)
         for section in sections(scenario_schema())
         for entry in section.entries
     ]
-    shown = [(key, entry) for key, entry in found if f"{key}.".startswith(f"{beginning}." if beginning else "")]
-    shown = shown or [(key, entry) for key, entry in found if key.rpartition(".")[2].startswith(beginning)]
+    shown = [(key, entry) for key, entry in entries if f"{key}.".startswith(f"{beginning}." if beginning else "")]
+    shown = shown or [(key, entry) for key, entry in entries if key.rpartition(".")[2].startswith(beginning)]
     if not shown:
-        raise UnknownNameError("key", beginning, [key for key, _ in found])
+        raise UnknownNameError("key", beginning, [key for key, _ in entries])
     for key, entry in shown:
         allowed = entry.allowed.replace("`", "")
         print(textwrap.fill(f"{key} ({allowed}): {entry.says.replace('`', '')}", WIDTH, subsequent_indent="  "))

@@ -55,19 +55,19 @@ def _theorems(*, record: bool, limit_s: float) -> int:
     from airground_drake.verify.proofs import theories
     from airground_drake.verify.proofs.theorems import THEOREMS
 
-    found = theories.check(limit_s=limit_s)
+    checked = theories.check(limit_s=limit_s)
     for name, theorem in THEOREMS.items():
         print(f"{name}: {theorem.statement}")
         if theorem.silent_on:
             print(f"    does not say: {theorem.silent_on}")
-        print(f"    axioms: {', '.join(found.axioms[name]) or 'none'}")
+        print(f"    axioms: {', '.join(checked.axioms[name]) or 'none'}")
     print(
-        f"Coq {found.coq}: {len(found.axioms)} theorems in {len(found.sha256)} files, compiled in "
-        f"{found.compile_s:.0f} s, checked again by coqchk in {found.again_s:.0f} s"
+        f"Coq {checked.coq}: {len(checked.axioms)} theorems in {len(checked.sha256)} files, compiled in "
+        f"{checked.compile_s:.0f} s, checked again by coqchk in {checked.again_s:.0f} s"
     )
     if record:
-        print(theories.write_record(found))
-    differing = theories.differences(found)
+        print(theories.write_record(checked))
+    differing = theories.differences(checked)
     for line in differing:
         print(line)
     return EXIT_UNPROVED if differing else 0
@@ -79,28 +79,28 @@ def _runs(options: argparse.Namespace) -> int:
     from airground_drake.verify.proofs.runs import prove_report
 
     code = 0
-    for found in prove_report(options.report, options.run, options.limit):
-        print("\n".join(_lines(found)), flush=True)
-        if (found.expected or options.run) and not found.distances.proved:
+    for proof in prove_report(options.report, options.run, options.limit):
+        print("\n".join(_lines(proof)), flush=True)
+        if (proof.expected or options.run) and not proof.distances.proved:
             code = EXIT_UNPROVED
     if proved.write(options.report):
         print(f"{options.report / 'report.html'} says so beside {DISTANCES}")
     return code
 
 
-def _lines(found: Proved) -> list[str]:
+def _lines(proof: Proved) -> list[str]:
     """The lines about a run."""
     lines = []
-    pairs = "1 pair" if found.lawful == 1 else f"{found.lawful} pairs"
-    some = "" if found.lawful == found.pairs else f" by {pairs} (of robots without lag, and with balls at rest)"
+    pairs = "1 pair" if proof.lawful == 1 else f"{proof.lawful} pairs"
+    some = "" if proof.lawful == proof.pairs else f" by {pairs} (of robots without lag, and with balls at rest)"
     for what, answer in (
-        (f"all {found.pairs} distances kept at all times", found.distances),
-        (f"avoidance law obeyed without error{some}", found.law),
+        (f"all {proof.pairs} distances kept at all times", proof.distances),
+        (f"avoidance law obeyed without error{some}", proof.law),
     ):
         if answer.proved:
-            lines.append(f"run {found.run}: {what}: proved in {answer.seconds:.1f} s ({answer.file})")
+            lines.append(f"run {proof.run}: {what}: proved in {answer.seconds:.1f} s ({answer.file})")
         else:
-            lines.append(f"run {found.run}: {what}: not proved: {answer.why}")
-    if not found.expected:
-        lines.append(f"run {found.run}: the scenario does not ask for it: it does not expect {DISTANCES} to hold")
+            lines.append(f"run {proof.run}: {what}: not proved: {answer.why}")
+    if not proof.expected:
+        lines.append(f"run {proof.run}: the scenario does not ask for it: it does not expect {DISTANCES} to hold")
     return lines

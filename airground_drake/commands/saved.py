@@ -20,19 +20,19 @@ def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
     if not is_report(folder):
         raise FolderError(one_line(f"{folder} is not a report; allowed: a folder that `airground report` has written"))
     files.refuse_links(folder)
-    found = sorted(path.parent.name for path in folder.glob("trace/*/meta.json"))
-    if not found:
+    runs = sorted(path.parent.name for path in folder.glob("trace/*/meta.json"))
+    if not runs:
         raise FolderError(one_line(f"{folder} has no runs to replay; allowed: a report with trace/RUN/meta.json"))
-    if run not in (None, *found):
-        raise UnknownNameError("run", run, found)
-    return found if run is None else [run]
+    if run not in (None, *runs):
+        raise UnknownNameError("run", run, runs)
+    return runs if run is None else [run]
 
 
 def outside_reports(folder: Path, what: str) -> None:
     """Create a folder for `what`. Reports are left as they are: the checker refuses files that are not theirs."""
-    for each in (folder.resolve(), *folder.resolve().parents):
-        if is_report(each):
-            raise FolderError(one_line(f"{folder} is in the report {each}, which is complete; name another, with -o"))
+    for above in (folder.resolve(), *folder.resolve().parents):
+        if is_report(above):
+            raise FolderError(one_line(f"{folder} is in the report {above}, which is complete; name another, with -o"))
     files.make_folder(folder, what)
 
 

@@ -61,10 +61,10 @@ def judge(
 def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progress: Progress) -> list[dict[str, Any]]:
     """The outcome of every run with each of the seeds 1 to `number`, by run, then by seed; see `metrics.outcome`."""
     others = [seed for seed in range(1, number + 1) if seed != scenario.seed]
-    found = [metrics.outcome(trace) for trace in simulate_seeds(scenario, others, progress=progress)]
-    found += [metrics.outcome(trace) for trace in own.values() if 1 <= scenario.seed <= number]
+    outcomes = [metrics.outcome(trace) for trace in simulate_seeds(scenario, others, progress=progress)]
+    outcomes += [metrics.outcome(trace) for trace in own.values() if 1 <= scenario.seed <= number]
     order = {name: k for k, name in enumerate(scenario.runs)}
-    return sorted(found, key=lambda row: (order[row["run"]], row["seed"]))
+    return sorted(outcomes, key=lambda row: (order[row["run"]], row["seed"]))
 
 
 def write(
@@ -133,13 +133,13 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
 
 def versions() -> dict[str, str]:
     """Versions of the package and of the libraries that its numbers depend on."""
-    found = {}
+    installed = {}
     for name in PACKAGES:
         try:
-            found[name] = version(name)
+            installed[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            installed[name] = "not installed"
+    return installed
 
 
 def _solver(scenario: Scenario, daqp: str) -> str:

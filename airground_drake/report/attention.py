@@ -85,7 +85,9 @@ def beforehand(report: Report) -> Iterator[Item]:
     longer = {name: time_s for name, time_s in longer.items() if time_s > scenario.duration_s}
     if longer:
         names = list(longer)
-        who = ", ".join(names[:MAX_NAMES]) + f" and {len(names) - MAX_NAMES} more" * (len(names) > MAX_NAMES)
+        who = ", ".join(names[:MAX_NAMES])
+        if len(names) > MAX_NAMES:
+            who += f" and {len(names) - MAX_NAMES} more"
         ends = f"duration_s = {scenario.duration_s:g} ends the runs before the presets of {who} do"
         yield Item("inconclusive", f"{ends} ({max(longer.values()):.3g} s): they cannot be expected to arrive")
 
@@ -112,7 +114,8 @@ def _of_faults(runs: Mapping[str, Run]) -> Iterator[Item]:
             yield Item("error", f"policy {kind['policy']}: {kind['what']} ({often})", run=name, anchor="happened")
         if len(kinds) > MAX_FAULTS:
             more = len(kinds) - MAX_FAULTS
-            yield Item("error", f"{counted(more, 'more kind')} of fault{'s' * (more > 1)}", run=name, anchor="happened")
+            noun = "fault" if more == 1 else "faults"
+            yield Item("error", f"{counted(more, 'more kind')} of {noun}", run=name, anchor="happened")
 
 
 def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

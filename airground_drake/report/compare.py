@@ -41,20 +41,20 @@ def compared(before: Report, after: Report) -> dict[str, Any]:
     # `margins`, `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None
     # if missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`, `kind` and
     # `n`, the number of the event among those of its kind, from 1. Margins have their `relative` change.
-    found: dict[str, Any] = {
+    changes_of: dict[str, Any] = {
         "inputs": list(_inputs(before, after)),
         "overall": list(_overall(before, after)),
         "verdicts": list(_verdicts(before, after)),
-        "margins": [{**each, "relative": _relative(each)} for each in _of_claims(before, after, "margin")],
+        "margins": [{**change, "relative": _relative(change)} for change in _of_claims(before, after, "margin")],
         "exercised": list(_of_claims(before, after, "exercised")),
         "expectations": list(_of_claims(before, after, "expected")),
         "reproduction": list(_rows(before, after)),
         "audit": list(_findings(before, after)),
         "events": list(_events(before, after)),
     }
-    for change in (changes := [change for part in found.values() for change in part]):
+    for change in (changes := [change for part in changes_of.values() for change in part]):
         change.setdefault("worse", False)
-    return {"regressions": sum(change["worse"] for change in changes), **found}
+    return {"regressions": sum(change["worse"] for change in changes), **changes_of}
 
 
 def is_rounding(change: Change) -> bool:
@@ -86,9 +86,9 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def rounded(found: Mapping[str, Any], part: str) -> list[Change]:
+def rounded(changes_of: Mapping[str, Any], part: str) -> list[Change]:
     """The changes of a part by no more than rounding; whatever changes in the inputs counts."""
-    return [] if part == "inputs" else [change for change in found[part] if is_rounding(change)]
+    return [] if part == "inputs" else [change for change in changes_of[part] if is_rounding(change)]
 
 
 def _inputs(before: Report, after: Report) -> Iterator[Change]:
@@ -104,8 +104,8 @@ def _inputs(before: Report, after: Report) -> Iterator[Change]:
 
 def _differing(was: Any, now: Any, key: str) -> Iterator[Change]:
     """What differs in nested dicts, and in lists of dicts, by dotted key."""
-    if all(isinstance(side, list) and any(isinstance(each, Mapping) for each in side) for side in (was, now)):
-        was, now = ({str(index): each for index, each in enumerate(side)} for side in (was, now))
+    if all(isinstance(side, list) and any(isinstance(item, Mapping) for item in side) for side in (was, now)):
+        was, now = ({str(index): item for index, item in enumerate(side)} for side in (was, now))
     if isinstance(was, Mapping) and isinstance(now, Mapping):
         for name in dict.fromkeys([*was, *now]):
             yield from _differing(was.get(name), now.get(name), f"{key}.{name}" if key else str(name))
@@ -151,7 +151,7 @@ def _rows(before: Report, after: Report) -> Iterator[Change]:
 def _findings(before: Report, after: Report) -> Iterator[Change]:
     """Findings about the paper."""
     for (number,), old, new in _paired(before.audit, after.audit, "id"):
-        was, now = (each and each.model_dump(include={"demonstrated", "paper", "ours"}) for each in (old, new))
+        was, now = (finding and finding.model_dump(include={"demonstrated", "paper", "ours"}) for finding in (old, new))
         if was != now:
             worse = bool(old and old.demonstrated and not (new and new.demonstrated))
             yield {"id": number, "before": was, "after": now, "worse": worse}
@@ -174,7 +174,7 @@ def _paired(
     before: Sequence[E], after: Sequence[E], *keys: str
 ) -> Iterator[tuple[tuple[str, ...], E | None, E | None]]:
     """Entries with the same key in both lists, and those in only one of them."""
-    old, new = ({tuple(str(getattr(each, key)) for key in keys): each for each in part} for part in (before, after))
+    old, new = ({tuple(str(getattr(entry, key)) for key in keys): entry for entry in part} for part in (before, after))
     for key in dict.fromkeys([*old, *new]):
         yield key, old.get(key), new.get(key)
 

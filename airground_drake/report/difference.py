@@ -18,9 +18,9 @@ def first_difference(recorded: Trace, made: Trace) -> Difference | None:
     """The first value in which two traces differ, of the earliest row of a table; None if they are equal."""
     # Numbers are compared exactly; times by the clock are not compared.
     for name in TABLES:
-        found = _first_cell(name, getattr(recorded, name), getattr(made, name))
-        if found is not None:
-            return found
+        difference = _first_cell(name, getattr(recorded, name), getattr(made, name))
+        if difference is not None:
+            return difference
     return first_of(recorded.meta, made.meta, "meta.json")
 
 
@@ -30,11 +30,11 @@ def _first_cell(name: str, recorded: pd.DataFrame, made: pd.DataFrame) -> Differ
         return first_of([*recorded], [*made], f"{name}: column")
     rows = min(len(recorded), len(made))
     first, column = rows, ""
-    for k, each in enumerate(recorded):
+    for k, heading in enumerate(recorded):
         theirs, ours = recorded.iloc[:first, k].tolist(), made.iloc[:first, k].tolist()
         row = next((row for row, both in enumerate(zip(theirs, ours, strict=True)) if not _equal(*both)), first)
         if row < first:
-            first, column = row, str(each)
+            first, column = row, str(heading)
     if column:
         at = f", t = {recorded['t_s'].iloc[first]:.9g} s" if "t_s" in recorded else ""
         both = recorded[column].iloc[first], made[column].iloc[first]

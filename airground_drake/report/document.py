@@ -46,7 +46,7 @@ def build(
         {
             **verdict.to_json(),
             "rerun": f"airground verify trace/{verdict.run or some_run} {verdict.claim.id}"
-            + f" {OPTION}" * (verdict.claim.id in scenario.claims),
+            + (f" {OPTION}" if verdict.claim.id in scenario.claims else ""),
         }
         for verdict in verdicts
     ]
@@ -54,12 +54,12 @@ def build(
     resolved = asdict(scenario)
     about = {key: resolved[key] for key in ("name", "title", "description")}
     runs = {name: _run(scenario, trace) for name, trace in traces.items()}
-    found = expected_numbers(scenario, runs)
+    numbers = expected_numbers(scenario, runs)
     document = {
         "schema": SCHEMA,
         "scenario": {**about, "sha256": scenario.digest, "resolved": resolved},
         "provenance": dict(provenance),
-        "overall": overall(claims, missing(scenario, traces, claims, required), items if audited else (), found),
+        "overall": overall(claims, missing(scenario, traces, claims, required), items if audited else (), numbers),
         "runs": runs,
         "seeds": list(seeds),
         "claims": claims,
@@ -88,15 +88,15 @@ def overall(
     keys = ("id", "run", "status", "expected", "exercised")
     unexpected = [{key: claim[key] for key in keys} for claim in claims if claim["as_expected"] is False]
     unexpected += [
-        {**{key: each[key] for key in ("id", "run")}, "status": str(each["found"]),
-         "expected": f"at least {each['least']}", "exercised": each["found"]}
-        for each in numbers if not each["as_expected"]
+        {**{key: number[key] for key in ("id", "run")}, "status": str(number["found"]),
+         "expected": f"at least {number['least']}", "exercised": number["found"]}
+        for number in numbers if not number["as_expected"]
     ]  # fmt: skip
     checks = sum(claim["as_expected"] is not None for claim in claims) + len(numbers)
     differs = [claim for claim in unexpected if claim["status"] not in UNDECIDED]
     undecided = [claim for claim in unexpected if claim["status"] in UNDECIDED]
     outcomes = [(outcome(claim["status"], claim["exercised"]), claim) for claim in claims]
-    counts = Counter(found for found, _ in outcomes)
+    counts = Counter(result for result, _ in outcomes)
     if differs:
         status = "not_as_expected"
         differ = "differs" if len(differs) == 1 else "differ"
@@ -117,7 +117,7 @@ def overall(
         "checks": checks,
         "as_expected": checks - len(unexpected),
         "counts": {name: counts[name] for name in (*STATUSES, NOT_EXERCISED) if counts[name]},
-        "not_exercised": _named(claim for found, claim in outcomes if found == NOT_EXERCISED),
+        "not_exercised": _named(claim for result, claim in outcomes if result == NOT_EXERCISED),
         "unpromised": _named(claim for claim in claims if claim["as_expected"] is None),
         "differs": differs,
         "undecided": undecided,
@@ -133,14 +133,14 @@ def expected_numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) 
     for name, run in runs.items():
         sent = run["metrics"]["messages"] or {"proposals": 0, "answers": 0}
         counts = {
-            "interventions": sum(each["begun_s"] is not None for each in run["metrics"]["interventions"]),
+            "interventions": sum(row["begun_s"] is not None for row in run["metrics"]["interventions"]),
             "messages": sent["proposals"] + sent["answers"],
         }
         expected = scenario.runs[name].expected
         for kind in COUNTS:
             if kind in expected:
-                found, least = counts[kind], expected[kind]
-                listed.append({"id": kind, "run": name, "found": found, "least": least, "as_expected": found >= least})
+                count, least = counts[kind], expected[kind]
+                listed.append({"id": kind, "run": name, "found": count, "least": least, "as_expected": count >= least})
     return listed
 
 
@@ -153,18 +153,18 @@ def missing(
     """Runs without a trace or any verdict; claims that are expected, required or added, but nobody checked."""
     checked = {(claim["run"], claim["id"]) for claim in claims}
     judged = {run for run, _ in checked}
-    found = []
+    gaps = []
     for name, run in scenario.runs.items():
         if name not in traces:
-            found.append((name, "", "the run has no trace"))
+            gaps.append((name, "", "the run has no trace"))
         elif name not in judged:
-            found.append((name, "", "no claim was checked on the run"))
+            gaps.append((name, "", "no claim was checked on the run"))
         else:
-            found += [(name, claim, "expected, but not checked") for claim in run.expected if claim not in COUNTS]
-    found += [("", claim, "not checked") for claim in dict.fromkeys([*required, *scenario.expected])]
-    unjudged = {*scenario.claims} - {claim for _, claim in checked} - {claim for _, claim, _ in found}
-    found += [("", claim, "the scenario adds it, and it applies to no run") for claim in sorted(unjudged)]
-    return [{"run": run, "id": claim, "why": why} for run, claim, why in found if (run, claim) not in checked]
+            gaps += [(name, claim, "expected, but not checked") for claim in run.expected if claim not in COUNTS]
+    gaps += [("", claim, "not checked") for claim in dict.fromkeys([*required, *scenario.expected])]
+    unjudged = {*scenario.claims} - {claim for _, claim in checked} - {claim for _, claim, _ in gaps}
+    gaps += [("", claim, "the scenario adds it, and it applies to no run") for claim in sorted(unjudged)]
+    return [{"run": run, "id": claim, "why": why} for run, claim, why in gaps if (run, claim) not in checked]
 
 
 def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:

@@ -32,18 +32,18 @@ def tables(evidence: Mapping[str, Any], caption: str, number: Callable[[Any], st
     """The evidence: first one table of single values, then one for each key that holds several records."""
     single = {key: value for key, value in evidence.items() if not _records(value)}
     rows = tuple((in_words(key), _cell(value, number)) for key, value in single.items())
-    found = [Table(caption, ("quantity", "value"), rows[:MAX_ROWS])] if rows else []
+    made = [Table(caption, ("quantity", "value"), rows[:MAX_ROWS])] if rows else []
     for key, value in evidence.items():
         if records := _records(value):
-            found.append(_table(f"{caption}: {in_words(key)}", records, number))
-    return found
+            made.append(_table(f"{caption}: {in_words(key)}", records, number))
+    return made
 
 
 def _records(value: Any) -> list[tuple[str, Mapping[str, Any]]]:
     """The records in a list, by number, or in a record, by key; empty if the value is neither."""
     items = value.items() if isinstance(value, Mapping) else enumerate(value, 1) if isinstance(value, list) else ()
-    records = [(str(key), each) for key, each in items]
-    return records if all(isinstance(each, Mapping) and each for _, each in records) else []
+    records = [(str(key), record) for key, record in items]
+    return records if all(isinstance(record, Mapping) and record for _, record in records) else []
 
 
 def _table(caption: str, records: Sequence[tuple[str, Mapping[str, Any]]], number: Callable[[Any], str]) -> Table:
@@ -52,8 +52,9 @@ def _table(caption: str, records: Sequence[tuple[str, Mapping[str, Any]]], numbe
     rows = tuple(
         (head, *(_cell(record[key], number) if key in record else "" for key in shown)) for head, record in records
     )
-    more = [f"{len(rows) - MAX_ROWS} more rows"] * (len(rows) > MAX_ROWS)
-    more += [f"{left_out} more columns"] * (left_out > 0)
+    more = [f"{len(rows) - MAX_ROWS} more rows"] if len(rows) > MAX_ROWS else []
+    if left_out > 0:
+        more.append(f"{left_out} more columns")
     note = f" ({', '.join(more)} in report.json)" if more else ""
     return Table(f"{caption}{note}", ("", *map(in_words, shown)), rows[:MAX_ROWS])
 

@@ -32,7 +32,9 @@ class RunFacts:
     """What came of a run that the scenario names, and that was run."""
 
     def __init__(self, report: Report, name: str) -> None:
-        self.name, self.run, self._scenario = name, report.runs[name], report.scenario.resolved
+        self.name = name
+        self.run = report.runs[name]
+        self._scenario = report.scenario.resolved
         self._spec, self._metrics = self._scenario.runs[name], self.run.metrics
         about = sorted((claim for claim in report.claims if claim.run in ("", name)), key=lambda claim: claim.run)
         self._claims = {claim.id: claim for claim in about}
@@ -93,18 +95,18 @@ class RunFacts:
         """Collisions by time, or else pairs that came too near, those of least margin first; the robots' own first."""
         # Empty where the claim alone says that a distance was not kept.
         events = {id(hit): hit for hit in self.hits.values()}.values()
-        found = [
+        breaches = [
             Breach(
                 hit["robot"], other, f"{hit['robot']}\N{EN DASH}{named(other, hit.get('at_m'))} at {hit['t_s']:.2f} s"
             )
             for hit in events
             if (other := hit.get("other") or hit["obstacle"])
         ]
-        found = found or [Breach(near.robot, near.other, near.line) for near in self.near if near.is_short]
-        met = {frozenset((one["first"], one["second"])): one["doing"]
-               for one in self.claim(rules.DISTANCES).evidence.get("encounters", ())}  # fmt: skip
-        found = [breach._replace(doing=met.get(frozenset(breach[:2]), "")) for breach in found]
-        return sorted(found, key=lambda breach: breach.doing not in rules.OURS)
+        breaches = breaches or [Breach(near.robot, near.other, near.line) for near in self.near if near.is_short]
+        met = {frozenset((encounter["first"], encounter["second"])): encounter["doing"]
+               for encounter in self.claim(rules.DISTANCES).evidence.get("encounters", ())}  # fmt: skip
+        breaches = [breach._replace(doing=met.get(frozenset(breach[:2]), "")) for breach in breaches]
+        return sorted(breaches, key=lambda breach: breach.doing not in rules.OURS)
 
     @property
     def others_too_close(self) -> int:
@@ -127,23 +129,23 @@ class RunFacts:
         if not doings or "" in doings:
             return ""
         if not ours:
-            return "not the robots' doing" * (self.claim(rules.OWN_DOING).status != "refuted")
+            return "" if self.claim(rules.OWN_DOING).status == "refuted" else "not the robots' doing"
         if len(ours) < len(doings):
             return f"{len(ours)} of {len(doings)} the robots' doing"
-        return "the robots' doing" + ", by commands already under way" * ({*ours} == {"under way"})
+        return "the robots' doing" + (", by commands already under way" if {*ours} == {"under way"} else "")
 
     @property
     def contradicts_its_proof(self) -> bool:
         """Whether a distance was broken that a theorem keeps, though the theorem's conditions held."""
         # Beside what moves, a robot only keeps from bringing itself too near by commands that were not under way.
-        kept = [each for each in self.breaches if each.second not in self.movers or each.doing == "robot"]
+        kept = [breach for breach in self.breaches if breach.second not in self.movers or breach.doing == "robot"]
         return self.is_proved and (bool(kept) or not self.breaches)
 
     @property
     def faster(self) -> list[str]:
         """Obstacles that moved faster than declared."""
         beside = self.claim(rules.CONDITIONS).evidence.get("beside_moving", ())
-        return sorted({each["second"] for each in beside if each["too_fast_s"] is not None})
+        return sorted({mover["second"] for mover in beside if mover["too_fast_s"] is not None})
 
     @property
     def unmapped(self) -> list[str]:

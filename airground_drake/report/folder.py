@@ -56,8 +56,8 @@ def prepare(folder: Path) -> None:
         if why := _refused(folder):
             raise FolderError(one_line(f"{folder} holds {why}; {RULE}"))
         files.sweep(folder)
-        for each in (folder, *_parts(folder)):
-            files.try_to_write(each)
+        for part in (folder, *_parts(folder)):
+            files.try_to_write(part)
 
 
 def clear(folder: Path) -> None:
@@ -115,4 +115,4 @@ def _within(folder: Path) -> Iterator[Path]:
 
 def _parts(folder: Path) -> list[Path]:
     """The folders of a report in the folder, each before those in it."""
-    return [each for each in _within(folder) if each.is_dir() and _FOLDERS.fullmatch(str(each.relative_to(folder)))]
+    return [path for path in _within(folder) if path.is_dir() and _FOLDERS.fullmatch(str(path.relative_to(folder)))]

@@ -91,7 +91,7 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
     # figures: as drawn by `figures.draw` and the like, in the order of the page.
     # diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
     distances = [(name, pair) for name, run in report.runs.items() for pair in pairs(run)]
-    distances.sort(key=lambda found: found[1].margin_m)
+    distances.sort(key=lambda named: named[1].margin_m)
     plates = grouped((figure.beside or PLACES.get(figure.id, "happened"), figure) for figure in figures)
     diagram = _diagram(diagram_svg, report.scenario.name)
     sections = {
@@ -209,7 +209,7 @@ def value(x: Any, unit: str = "") -> str:
         return "no value"
     if unit == YES_NO:
         return "yes" if x else "no"
-    text = f"({', '.join(number(each) for each in x)})" if isinstance(x, list) else number(x)
+    text = f"({', '.join(number(axis) for axis in x)})" if isinstance(x, list) else number(x)
     return f"{text} {unit}".strip()
 
 

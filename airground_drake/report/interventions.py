@@ -30,12 +30,13 @@ def interventions(trace: Trace) -> list[dict[str, Any]]:
         return []
     numbers = {ugv: trace.sampled(f"{ugv}.executing") for ugv in trace.ugvs}
     answers = dict(iter(trace.decisions.sort_values("t_s", kind="stable").groupby("number")))
-    return [_became(trace, one, numbers[one.ugv], answers.get(one.number)) for one in sent]
+    return [_became(trace, proposal, numbers[proposal.ugv], answers.get(proposal.number)) for proposal in sent]
 
 
 def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) -> dict[str, Any]:
     """What became of a proposal, from what its UGV executed (S,), and the decisions about it, if there are any."""
-    times, during = trace.sampled("t_s"), np.flatnonzero(numbers == sent.number)
+    times = trace.sampled("t_s")
+    during = np.flatnonzero(numbers == sent.number)
     begun_s = float(times[during[0]]) if during.size else None
     ended_s = float(times[during[-1] + 1]) if during.size and during[-1] + 1 < len(times) else None
     yes = None if answers is None else answers[answers["decision"] == "accept"]
@@ -86,7 +87,7 @@ def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float |
             return _end("over" if reasons[0] == OVER else "given up", ended_s, reasons[0])
     if ended_s >= sent.times_s[-1] - TIME_TOLERANCE_S:
         return _end("over", ended_s)
-    later = (one.issued_s for one in proposals_of(trace) if one.ugv == sent.ugv and one.issued_s > sent.issued_s)
+    later = (row.issued_s for row in proposals_of(trace) if row.ugv == sent.ugv and row.issued_s > sent.issued_s)
     if any(issued_s <= ended_s + TIME_TOLERANCE_S for issued_s in later):
         return _end("replaced", ended_s)
     row = row_at(trace, ended_s)
@@ -96,7 +97,9 @@ def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float |
 
 def messages(trace: Trace) -> dict[str, Any] | None:
     """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes."""
-    method, scenario, ugvs = method_of(trace.meta["method"]), trace.scenario, trace.ugvs
+    method = method_of(trace.meta["method"])
+    scenario = trace.scenario
+    ugvs = trace.ugvs
     if not method.intervenes:
         return None
     delivered = trace.messages[trace.messages["received_s"].notna()]
@@ -107,9 +110,9 @@ def messages(trace: Trace) -> dict[str, Any] | None:
         for ugv in ugvs
     }  # fmt: skip
     before_s = scenario.duration_s - TIME_TOLERANCE_S  # the first instant is at 0
-    planned, decided = (math.ceil(before_s / each.period_s) for each in (scenario.intervention, scenario.gatekeeper))
+    planned, decided = (math.ceil(before_s / part.period_s) for part in (scenario.intervention, scenario.gatekeeper))
     return {
-        **{f"{kind}s": sum(each[f"{kind}s"] for each in robots.values()) for kind in parties},
+        **{f"{kind}s": sum(counts[f"{kind}s"] for counts in robots.values()) for kind in parties},
         "always_on": {"proposals": len(ugvs) * planned, "answers": len(ugvs) * decided * method.gated},
         "robots": robots,
     }
@@ -117,14 +120,15 @@ def messages(trace: Trace) -> dict[str, Any] | None:
 
 def avoidance(trace: Trace) -> dict[str, dict[str, int]]:
     """By UGV the numbers of control samples at which it executed a proposal, avoidance bound, and both."""
-    found = {}
+    counted = {}
     for ugv in trace.ugvs:
-        executes, given = trace.sampled(f"{ugv}.executing") >= 0, inequalities_of(trace, ugv)
+        executes = trace.sampled(f"{ugv}.executing") >= 0
+        given = inequalities_of(trace, ugv)
         bound = np.zeros(len(executes), dtype=np.bool_)
         bound[given.sample[given.slack(trace.chosen(ugv)) <= BINDING_M_S]] = True
         counts = {"executing": executes, "binding": bound, "both": executes & bound}
-        found[ugv] = {name: int(flags.sum()) for name, flags in counts.items()}
-    return found
+        counted[ugv] = {name: int(flags.sum()) for name, flags in counts.items()}
+    return counted
 
 
 def farthest_from_prediction(trace: Trace) -> dict[str, Any] | None:
@@ -137,7 +141,7 @@ def farthest_from_prediction(trace: Trace) -> dict[str, Any] | None:
     except TraceError:  # which claims report
         return None
     numbers = {ugv: trace.sampled(f"{ugv}.executing") for ugv in trace.ugvs}
-    return max((_off_prediction(trace, row, numbers[row.robot]) for row in rows), key=lambda one: float(one["away_m"]))
+    return max((_off_prediction(trace, row, numbers[row.robot]) for row in rows), key=lambda row: float(row["away_m"]))
 
 
 def _off_prediction(trace: Trace, row: DecisionRecord, numbers: Array) -> dict[str, Any]:

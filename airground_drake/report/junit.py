@@ -51,16 +51,16 @@ def _case(suite: ET.Element, scenario: str, run: str, claim: str) -> ET.Element:
 def _outcome(case: ET.Element, claim: Claim) -> None:
     """Add to a test case what came of its claim."""
     idle = outcome(claim.status, claim.exercised) == NOT_EXERCISED
-    found = f"{claim.status}, nothing to check (0 {claim.exercised_by})" if idle else claim.status
+    status = f"{claim.status}, nothing to check (0 {claim.exercised_by})" if idle else claim.status
     if claim.as_expected is not False:
-        told = f"{found}, nothing promised" if claim.as_expected is None else found if idle else ""
+        told = f"{status}, nothing promised" if claim.as_expected is None else status if idle else ""
         if told:
             ET.SubElement(case, "skipped", {"message": _text(f"{told}: {claim.statement}")})
         return
     margin = "" if claim.margin is None else f", margin {claim.margin:.4g} {claim.unit}".rstrip()
     if margin and claim.quantity:
         margin += f" ({claim.quantity})"
-    message = _text(f"{found}, expected {claim.expected}{margin}: {claim.statement}")
+    message = _text(f"{status}, expected {claim.expected}{margin}: {claim.statement}")
     if claim.status == "not_run":
         ET.SubElement(case, "skipped", {"message": message})
         return

@@ -36,7 +36,7 @@ def short(value: Any, most: int = 120) -> str:
     return text if len(text) <= most else f"{text[:most]}..."
 
 
-def print_lines(found: Callable[[Progress], Iterator[Line]], limit_s: str) -> int:
+def print_lines(lines: Callable[[Progress], Iterator[Line]], limit_s: str) -> int:
     """Print lines, one JSON object each; before them, one with the key `JUDGED` for each step of the progress."""
     # What other code prints meanwhile goes to standard error, so that it is not taken for a line.
     # limit_s: CPU time that this process and each of its children may take, s.
@@ -53,7 +53,7 @@ def print_lines(found: Callable[[Progress], Iterator[Line]], limit_s: str) -> in
     most = int(float(limit_s)) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (most, most))
     try:
-        for line in found(Told()):
+        for line in lines(Told()):
             print(json.dumps(line, allow_nan=False), file=own, flush=True)
     except (AirgroundError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

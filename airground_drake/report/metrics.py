@@ -45,7 +45,8 @@ NO_GAP = 1e-9  # a relative optimality gap up to this is a rounding error
 
 def of_run(trace: Trace) -> dict[str, Any]:
     """Metrics of one run, as `model.Metrics` has them."""
-    method, wall_s = method_of(trace.meta["method"]), trace.timings.get("wall_s")
+    method = method_of(trace.meta["method"])
+    wall_s = trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
     return {
@@ -80,10 +81,11 @@ def of_run(trace: Trace) -> dict[str, Any]:
 def came_near(trace: Trace) -> list[dict[str, Any]]:
     """The pair of least margin among those that came nearer than they were when both were first there."""
     # Two entries at most: of all pairs; and of those of an obstacle that may move, if that is another pair.
-    pairs, bounds = pairs_of(trace), apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
+    pairs = pairs_of(trace)
+    bounds = apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
     order = np.argsort(bounds, kind="stable").tolist()
     moving = [k for k in order if kind_of(trace.scenario, pairs[k].first, pairs[k].second) == MOVING]
-    found = dict[tuple[str, str], dict[str, Any]]()
+    nearest = dict[tuple[str, str], dict[str, Any]]()
     for among in (order, moving):
         least: Gap | None = None
         for k in among:
@@ -95,8 +97,8 @@ def came_near(trace: Trace) -> list[dict[str, Any]]:
         if least is not None:
             first, second = least.pair.first, least.pair.second
             about = {"first": first, "second": second}
-            found.setdefault((first, second), about | _listed(trace, {second: least})[second])
-    return [*found.values()]
+            nearest.setdefault((first, second), about | _listed(trace, {second: least})[second])
+    return [*nearest.values()]
 
 
 APPROACH_M = 1e-3  # a pair comes nearer if its gap shrinks by more than this, m
@@ -130,14 +132,15 @@ def _on_the_way(trace: Trace, ugv: str) -> dict[str, Any]:
     begin_s, end_s = max(trace.t[-1] - AT_REST_S, trace.t[0]), trace.t[-1]
     before_m, left_m = (_way_left_m(trace, ugv, time_s) for time_s in (begin_s, end_s))
     moved_m = moved_at_the_end(trace, ugv)
-    stands, speed_m_s = moved_m <= AT_REST_M, (before_m - left_m) / (end_s - begin_s)
+    stands = moved_m <= AT_REST_M
+    speed_m_s = (before_m - left_m) / (end_s - begin_s)
     creeps = not stands and moved_m < CREEPING * trace.scenario.ugvs[ugv].preset.speed_m_s * (end_s - begin_s)
     return {
         "stands": stands,
         "creeps": creeps,
         "left_m": left_m,
         "left_s": left_m / speed_m_s if speed_m_s > 0.0 and not (stands or creeps) else None,
-        **({"kept_away": found} if stands and (found := _kept_away(trace, ugv)) else {}),
+        **({"kept_away": body} if stands and (body := _kept_away(trace, ugv)) else {}),
         **(place_on_map(trace, ugv, end_s) if stands and _is_at_map(trace, ugv) else {}),
     }
 
@@ -171,7 +174,8 @@ def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
 def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
     """Way of a UGV to its target, m: to the nearest point of its preset that is past by then, and along the preset."""
     own = trace.scenario.ugvs[ugv]
-    corners, place = np.array(own.preset.waypoints_m), interpolate(trace.t, trace.position(ugv), time_s)
+    corners = np.array(own.preset.waypoints_m)
+    place = interpolate(trace.t, trace.position(ugv), time_s)
     legs = np.diff(corners, axis=0)
     lengths = np.maximum(np.linalg.norm(legs, axis=1), 1e-12)  # corners may coincide
     begins = np.cumsum(lengths) - lengths
@@ -265,19 +269,19 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
 
 def closest_obstacle(trace: Trace, robot: str) -> Near | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    found = _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)
-    return min(_near(trace, robot, found), key=lambda near: (near.value_m, near.t_s), default=None)
+    gaps = _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)
+    return min(_near(trace, robot, gaps), key=lambda near: (near.value_m, near.t_s), default=None)
 
 
 def close_by(trace: Trace, robot: str) -> list[Near]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
-    found = _least(trace, robot, _obstacles(trace), NEAR_OBSTACLES)
-    found |= _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)
-    return sorted(_near(trace, robot, found), key=lambda near: near.margin_m)
+    gaps = _least(trace, robot, _obstacles(trace), NEAR_OBSTACLES)
+    gaps |= _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)
+    return sorted(_near(trace, robot, gaps), key=lambda near: near.margin_m)
 
 
-def _near(trace: Trace, robot: str, found: dict[str, Gap]) -> Iterator[Near]:
-    for other, least in found.items():
+def _near(trace: Trace, robot: str, gaps: dict[str, Gap]) -> Iterator[Near]:
+    for other, least in gaps.items():
         about = (least.margin_m, robot, other, least.gap_m, least.pair.required_m, least.t_s)
         yield Near(*about, at_m=_place(trace, other, least).get("at_m"))
 
@@ -321,7 +325,7 @@ def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[st
     return {among[k]: least_gap(trace, pairs[k]) for k in near}
 
 
-def _listed(trace: Trace, found: dict[str, Gap]) -> dict[str, dict[str, Any]]:
+def _listed(trace: Trace, gaps: dict[str, Gap]) -> dict[str, dict[str, Any]]:
     """Smallest gaps as report.json lists them."""
     return {
         other: {
@@ -330,5 +334,5 @@ def _listed(trace: Trace, found: dict[str, Gap]) -> dict[str, dict[str, Any]]:
             **({"appeared": True} if at_appearance(trace, least) else {}),
             **({"moves": True} if kind_of(trace.scenario, least.pair.first, other) == MOVING else {}),
         }
-        for other, least in found.items()
+        for other, least in gaps.items()
     }  # fmt: skip

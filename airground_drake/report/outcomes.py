@@ -47,7 +47,8 @@ class Near(NamedTuple):
     @property
     def line(self) -> str:
         """The pair, its distance beside the required one, and when: a line of the first screen."""
-        told, sign = metres(self.value_m, self.required_m).removesuffix(" m"), "<" if self.is_short else "≥"
+        told = metres(self.value_m, self.required_m).removesuffix(" m")
+        sign = "<" if self.is_short else "≥"
         apart = f"overlap {told[1:]} m" if told.startswith("-") else f"{told} {sign} {self.required_m:g} m"
         return f"{self.robot}\N{EN DASH}{self.whom} {apart} at {f'{self.t_s:.2f} s' if self.t_s > 0.0 else 'the start'}"
 
@@ -61,7 +62,7 @@ def pairs(run: Run) -> Iterator[Near]:
 
 def named(body: str, at_m: Sequence[float] | None = None) -> str:
     """The name of a body in words; of the map, which is everywhere, with the place that is meant, m."""
-    return f"the map at ({', '.join(f'{each + 0.0:.2f}' for each in at_m)})" if at_m else body
+    return f"the map at ({', '.join(f'{axis + 0.0:.2f}' for axis in at_m)})" if at_m else body
 
 
 def distance(value_m: float, required_m: float) -> str:

@@ -14,8 +14,8 @@ from airground_drake.verify.finding import Chart
 
 
 def page(report: Report, figures: Sequence[Figure], diagram_svg: str | None) -> str:
-    found = findings.draw([finding.model_dump() for finding in report.audit])
-    return html.render(report, [*figures, *_of_claims(report), *found], diagram_svg)
+    of_audit = findings.draw([finding.model_dump() for finding in report.audit])
+    return html.render(report, [*figures, *_of_claims(report), *of_audit], diagram_svg)
 
 
 def _of_claims(report: Report) -> Iterator[Figure]:

@@ -40,26 +40,26 @@ def write(folder: Path) -> bool:
     page, record = folder / PAGES["html"], folder / PAGES["json"]
     if not (page.exists() and record.exists()):
         return False
-    found = json.loads(files.read_text(folder / "proofs" / "proofs.json"))
+    proofs = json.loads(files.read_text(folder / "proofs" / "proofs.json"))
     report = json.loads(files.read_text(record))
     text = files.read_text(page)
-    there = {f"trace/{run}/meta.json": entry["meta_sha256"] for run, entry in found["runs"].items()}
+    there = {f"trace/{run}/meta.json": entry["meta_sha256"] for run, entry in proofs["runs"].items()}
     there[page.name] = files.sha256(text.encode())
     for name, digest in there.items():
         if report.get("files", {}).get(name) != digest:
             raise ReportError(
                 one_line(f"{folder / name} is not the file that report.json names: the page stays as it is")
             )
-    text = filled(text, found)
+    text = filled(text, proofs)
     report["files"][page.name] = files.sha256(text.encode())
     files.write_text(page, text)
     files.write_json(record, report)
     return True
 
 
-def filled(page: str, found: Mapping[str, Any]) -> str:
+def filled(page: str, proofs: Mapping[str, Any]) -> str:
     """A page with its places filled from proofs.json; places of other runs are emptied."""
-    runs = {run: _line(entry, found["coq"]) for run, entry in found["runs"].items()}
+    runs = {run: _line(entry, proofs["coq"]) for run, entry in proofs["runs"].items()}
     return _PLACES.sub(lambda at: _place(at[1], runs.get(at[1], Markup())), page)
 
 
@@ -71,9 +71,9 @@ def _line(entry: Mapping[str, Any], coq: str) -> Markup:
         says = f"machine-checked for this run (Coq {coq})"
     elif near:
         pairs = (
-            f"pair {one['first']}, {one['second']}: {distance(one['least_m'], one['safe_distance_m'])} at "
-            f"{one['t_s']:.6g} s, {one['safe_distance_m']:g} m required"
-            for one in near
+            f"pair {pair['first']}, {pair['second']}: {distance(pair['least_m'], pair['safe_distance_m'])} at "
+            f"{pair['t_s']:.6g} s, {pair['safe_distance_m']:g} m required"
+            for pair in near
         )
         says = f"Coq refused this run: {'; '.join(pairs)}"
     else:

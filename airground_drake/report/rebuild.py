@@ -52,7 +52,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
     traces = {name: with_events(trace.load(folder / "trace" / name, name)) for name in scenario.runs}
-    unscripted = [line for name, each in traces.items() for line in off_script(each, own(scenario, name))]
+    unscripted = [line for name, run in traces.items() for line in off_script(run, own(scenario, name))]
     if unscripted:
         yield from unscripted
         return  # what is judged on such a run is not about the scenario
@@ -109,9 +109,9 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
     from airground_drake.scenario.load import from_data
 
     own = _without_claims(report["scenario"]["resolved"])
-    judged = [replace(each, meta=each.meta | {"scenario": own}) for each in traces.values()]
+    judged = [replace(run, meta=run.meta | {"scenario": own}) for run in traces.values()]
     here = of_runs(scenario, traces)
-    others = [item for item in report["audit"] if item.get("id") not in {each["id"] for each in here}]
+    others = [item for item in report["audit"] if item.get("id") not in {finding["id"] for finding in here}]
     again = document.build(
         scenario,
         traces,
@@ -157,8 +157,9 @@ def _other_code(provenance: Any) -> str:
     """A note if other code wrote the report: it may word or draw things otherwise; empty if this code wrote it."""
     from airground_drake.report.document import commit
 
-    found = provenance if isinstance(provenance, dict) else {}
-    written, here = (found.get("package"), found.get("git")), (version("airground_drake"), commit())
+    about = provenance if isinstance(provenance, dict) else {}
+    written = (about.get("package"), about.get("git"))
+    here = (version("airground_drake"), commit())
     if written == here:
         return ""
     return "; other code wrote the report ({}, {}); this is {}, {}".format(*written, *here)
@@ -170,7 +171,7 @@ def _with_note(line: Line, note: str) -> Line:
 
 def _parts(report: Mapping[str, Any], again: Mapping[str, Any], scenario: Any) -> Iterator[Line]:
     """Each claim and each other part of report.json, compared with what was made again."""
-    recorded, rebuilt = ({(each["id"], each["run"]): each for each in of["claims"]} for of in (report, again))
+    recorded, rebuilt = ({(claim["id"], claim["run"]): claim for claim in of["claims"]} for of in (report, again))
     if len(report["claims"]) != len(recorded):
         yield different("claims", "", "number of claims", len(report["claims"]), len(recorded))
     for claim, run in {**recorded, **rebuilt}:
@@ -208,9 +209,9 @@ def _map(folder: Path, scenario: Any) -> Iterator[Line]:
     made = map_file.cells(
         replace(scenario.map, file=of_map(about)), folder, recorded.starts_m, str(folder), copied=True
     )
-    found = list(differences(asdict(recorded), asdict(replace(made, file=recorded.file))))
-    yield from (different("map", "", place, theirs, ours) for place, theirs, ours in found[:1])
-    if not found:
+    changes = list(differences(asdict(recorded), asdict(replace(made, file=recorded.file))))
+    yield from (different("map", "", place, theirs, ours) for place, theirs, ours in changes[:1])
+    if not changes:
         yield line_of("map", "", AGREES, f"{len(recorded.rectangles)} rectangles follow from its files")
 
 
@@ -222,10 +223,10 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
     from airground_drake.verify.proofs.compare import broken_rules
 
     made = model.of(report)
-    found: Any = None
+    proofs: Any = None
     if (folder / "proofs").is_dir():
         try:
-            found, broken = broken_rules(folder / "proofs", traces)
+            proofs, broken = broken_rules(folder / "proofs", traces)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             broken = [("proofs.json", "what `airground prove` writes", repr(error))]
         for about, ours, theirs in broken:
@@ -237,7 +238,7 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
         yield _same_text("junit.xml", folder, junit.render(made))
     if "report.html" in report["files"]:
         text = page(made, draw(scenario, traces), files.read_text(folder / "diagram.svg"))
-        text = text if found is None else proved.filled(text, found)
+        text = text if proofs is None else proved.filled(text, proofs)
         drawn_by = report["provenance"]["packages"]["matplotlib"]
         yield _same_text("report.html", folder, text, other_drawings=drawn_by != version("matplotlib"))
 
@@ -267,15 +268,15 @@ def _is_same_drawing(theirs: str, ours: str, *, shapes: bool) -> bool:
         return False
     if not shapes:
         return theirs.count("<!") + theirs.count("<?") == 0 and _kinds(theirs) <= _kinds(ours)
-    one, other = _GEOMETRY.split(theirs), _GEOMETRY.split(ours)  # every second part is an attribute
-    return one[::2] == other[::2] and all(map(_is_near, one[1::2], other[1::2]))
+    was, now = _GEOMETRY.split(theirs), _GEOMETRY.split(ours)  # every second part is an attribute
+    return was[::2] == now[::2] and all(map(_is_near, was[1::2], now[1::2]))
 
 
 def _is_near(theirs: str, ours: str) -> bool:
     """Whether two attributes are equal except for numbers, and these to WITHIN_PX."""
-    one, other = _NUMBER.split(theirs), _NUMBER.split(ours)  # every second part is a number
-    words = one[::2] == other[::2]
-    return words and all(abs(float(a) - float(b)) <= WITHIN_PX for a, b in zip(one[1::2], other[1::2], strict=True))
+    was, now = _NUMBER.split(theirs), _NUMBER.split(ours)  # every second part is a number
+    words = was[::2] == now[::2]
+    return words and all(abs(float(a) - float(b)) <= WITHIN_PX for a, b in zip(was[1::2], now[1::2], strict=True))
 
 
 def _kinds(drawing: str) -> set[tuple[str, str, str]]:

@@ -149,11 +149,11 @@ def _shortcomings(trace: Trace, robot: str) -> list[str]:
     triggers, accepted, refused = (_times(trace, robot, kind) for kind in ("trigger", "accept", "refuse"))
     x, zeta = _decision_variable(trace, robot)
     early = [t for t in triggers if np.interp(t, trace.t, x) < zeta - TRIGGER_TOLERANCE_M]
-    found = [] if triggers else ["it never triggers"]
-    found += [f"it triggers below the threshold at {_listed(early)}"] if early else []
-    found += [] if accepted else ["the gatekeeper never accepts"]
-    found += [f"the gatekeeper refuses at {_listed(refused)}"] if refused else []
-    return found + ["it does not arrive"] * (not _arrived(trace, robot))
+    lacks = [] if triggers else ["it never triggers"]
+    lacks += [f"it triggers below the threshold at {_listed(early)}"] if early else []
+    lacks += [] if accepted else ["the gatekeeper never accepts"]
+    lacks += [f"the gatekeeper refuses at {_listed(refused)}"] if refused else []
+    return lacks if _arrived(trace, robot) else [*lacks, "it does not arrive"]
 
 
 @measure
@@ -167,8 +167,8 @@ def _taken_back(trace: Trace, robot: str) -> list[str]:
     """What became of an acceptance that did not last."""
     accepted = _times(trace, robot, "accept")[:1]
     refused = [t for t in _times(trace, robot, "refuse") if accepted and t > accepted[0]]
-    found = [f"accepted at {_listed(accepted)}, refused at {_listed(refused)}"] if refused else []
-    return found + ["it does not arrive"] * (not _arrived(trace, robot))
+    lacks = [f"accepted at {_listed(accepted)}, refused at {_listed(refused)}"] if refused else []
+    return lacks if _arrived(trace, robot) else [*lacks, "it does not arrive"]
 
 
 @measure

@@ -69,7 +69,9 @@ class Row:
         if self.facts is None:
             return "open", self.what
         there, ugvs = self.facts.there, len(self.facts.ugvs)
-        came = f"{there} of {ugvs} arrive" + " before the run ends" * (self.facts.ends_too_early and there < ugvs)
+        came = f"{there} of {ugvs} arrive"
+        if self.facts.ends_too_early and there < ugvs:
+            came += " before the run ends"
         if not self.kept:
             return self.safe.mark, f"{came}, {self.what}"
         if self.bad_seeds:
@@ -104,8 +106,8 @@ def _headline(rows: Sequence[Row]) -> list[Line]:
     told = []
     for row, among in ((main[0], main), *[(rest[-1], rest) for _ in rest[:1]]):
         mark, says = row.clause
-        alike = [each for each in among if each.clause == row.clause]
-        told.append(Line(mark, f"{_who(alike)} ({', '.join(each.run for each in alike)}): {says}."))
+        alike = [other for other in among if other.clause == row.clause]
+        told.append(Line(mark, f"{_who(alike)} ({', '.join(other.run for other in alike)}): {says}."))
     return told
 
 
@@ -115,7 +117,7 @@ def _who(alike: Sequence[Row]) -> str:
 
 
 def _rows(report: Report) -> list[Row]:
-    found = []
+    rows = []
     for name, spec in report.scenario.resolved.runs.items():
         row = Row(name, _says(spec), spec.composition == "augmented")
         if name in report.runs:
@@ -124,34 +126,41 @@ def _rows(report: Report) -> list[Row]:
             row.kept, row.what = rule.kept, _what(run)
             row.safe, row.arrived, row.uav = _safe(run, rule), _arrived(run), _uav(run)
             row.bad_seeds = sum(seed.run == name and not seed.kept for seed in report.seeds)
-        found.append(row)
-    return found
+        rows.append(row)
+    return rows
 
 
 def _says(spec: Run) -> str:
     """What a run is: its method, or the method's identifier and what the run sets differently."""
     says = [rules.SETTINGS.get((key, str(value)), f"{key.split('.')[-1]} {value}") for key, value in spec.set.items()]
-    says += [rules.PRINTED] * (spec.composition != "augmented")
+    if spec.composition != "augmented":
+        says.append(rules.PRINTED)
     return f"({spec.method}) with {', '.join(says)}" if says else rules.RUNS.get(spec.method, spec.method)
 
 
 def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
     judged = run.claim(rules.DISTANCES)
-    faster = [f"{each} was faster than declared" for each in run.faster]
+    faster = [f"{mover} was faster than declared" for mover in run.faster]
     if rule.kept:
-        near = [each.line for each in run.approaches() if not each.is_short]
+        near = [near_body.line for near_body in run.approaches() if not near_body.is_short]
         return Cell(rule.mark, [rule.words, *(near[:MOST_NAMES] or ["nobody else is there"]), *faster])
     if rule.mark == "open":
         return Cell(
             rule.mark, [rule.words, f"the check: {(judged.status if judged.id else 'not made').replace('_', ' ')}"]
         )
-    as_declared = " (as declared)" * (judged.status == "refuted" and judged.as_expected is True)
+    as_declared = " (as declared)" if judged.status == "refuted" and judged.as_expected is True else ""
     lines = [rule.words + as_declared, *(breach.told for breach in run.breaches[:1])]
-    lines += [counted(len(run.breaches) - 1, "more collision")] * (run.collided and len(run.breaches) > 1)
-    lines += [f"{counted(run.others_too_close, 'more pair')} too close"] * (run.others_too_close > 0)
-    lines += [run.whose] * bool(run.whose) + faster
-    lines += [f"{each} is not on the UAV's map" for each in run.unmapped[:MOST_NAMES]]
-    return Cell(rule.mark, lines + ["contradicts its proof: please report"] * run.contradicts_its_proof)
+    if run.collided and len(run.breaches) > 1:
+        lines.append(counted(len(run.breaches) - 1, "more collision"))
+    if run.others_too_close:
+        lines.append(f"{counted(run.others_too_close, 'more pair')} too close")
+    if run.whose:
+        lines.append(run.whose)
+    lines += faster
+    lines += [f"{body} is not on the UAV's map" for body in run.unmapped[:MOST_NAMES]]
+    if run.contradicts_its_proof:
+        lines.append("contradicts its proof: please report")
+    return Cell(rule.mark, lines)
 
 
 def _what(run: RunFacts) -> str:
@@ -162,7 +171,7 @@ def _what(run: RunFacts) -> str:
     told = f"{len(run.breaches) or 'some'} {many}"
     if len(run.breaches) == 1:
         told = f"{run.breaches[0].first} and {run.breaches[0].second} {few}"
-    return told + f" ({run.whose})" * bool(run.whose)
+    return f"{told} ({run.whose})" if run.whose else told
 
 
 def _arrived(run: RunFacts) -> Cell:
@@ -170,14 +179,14 @@ def _arrived(run: RunFacts) -> Cell:
     away = [ugv for ugv in run.ugvs if ugv not in run.home]
     if not away:
         last = max((run.arrived_s.get(ugv, 0.0) for ugv in run.ugvs), default=0.0)
-        uav = ["the UAV did not"] * (run.uav not in run.home)
+        uav = [] if run.uav in run.home else ["the UAV did not"]
         return Cell("partly" if uav else "yes", [f"{count}, by {last:.1f} s", *uav])
     goal = run.claim(rules.ARRIVAL)
-    as_declared = " (as declared)" * (goal.as_expected is True)
+    as_declared = " (as declared)" if goal.as_expected is True else ""
     ends = [*grouped((run.ending(ugv), ugv) for ugv in away).items()]
     told = [f"{_named(who)} {how}" for how, who in ends]
     rest = sum(len(who) for _, who in ends[MOST_ENDINGS:])
-    more = [counted(rest, "more UGV")] * (rest > 0)
+    more = [counted(rest, "more UGV")] if rest else []
     return Cell(
         "partly" if run.there or run.ends_too_early else "no", [count + as_declared, *told[:MOST_ENDINGS], *more]
     )
@@ -185,8 +194,8 @@ def _arrived(run: RunFacts) -> Cell:
 
 def _named(names: Sequence[str]) -> str:
     """Some names, and how many more."""
-    more = f" and {len(names) - MOST_NAMES} more" * (len(names) > MOST_NAMES)
-    return ", ".join(names[:MOST_NAMES]) + more
+    some = ", ".join(names[:MOST_NAMES])
+    return f"{some} and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else some
 
 
 def _uav(run: RunFacts) -> Cell:
@@ -208,7 +217,8 @@ def _uav(run: RunFacts) -> Cell:
 
 
 def _seeds(report: Report) -> Iterator[Check]:
-    scenario, of_runs = report.scenario.resolved, grouped((seed.run, seed) for seed in report.seeds)
+    scenario = report.scenario.resolved
+    of_runs = grouped((seed.run, seed) for seed in report.seeds)
     ours = scenario.decision.noise_m_sqrt_s
     noise = [run.set.get("decision.noise_m_sqrt_s", ours) for run in scenario.runs.values()]
     told = grouped(
@@ -222,7 +232,7 @@ def _seeds(report: Report) -> Iterator[Check]:
         if kept < count:
             worst = min((seed for name in names for seed in of_runs[name]), key=lambda seed: Near.of(seed).margin_m)
             yield Check("Other seeds?", "", f"the worst: {Near.of(worst).line}, run {worst.run}, seed {worst.seed}")
-    if of_runs and not any(each > 0.0 for each in noise):
+    if of_runs and not any(level > 0.0 for level in noise):
         yield Check("Other seeds?", "none", "without decision noise a seed changes nothing")
 
 
@@ -240,14 +250,17 @@ def _zeno(report: Report) -> Iterator[Check]:
         gaps = [claim.evidence["smallest_gap"]["gap_s"] for claim in traces if "smallest_gap" in claim.evidence]
         short = dwell_s < report.scenario.resolved.control.period_s
         says, mark = f"at least {dwell_s:g} s between two triggers, proved", "partly" if short else "yes"
-        says += ": less than a control period" * short
+        if short:
+            says += ": less than a control period"
         if status != "proved":
             says, mark = "no least time between two triggers is proved", "no" if status == "refuted" else "open"
         if bad := [claim.run for claim in traces if claim.status == "refuted"]:
             says, mark = f"two triggers too close in {', '.join(bad)}", "no"
-        seen = f"; {min(gaps):.3g} s seen" if gaps else ""
-        seen = seen or "; no robot triggered twice" * (_verdict(traces) == "yes")
-        yield Check("Zeno-free?", mark, f"{', '.join(names)}: " * (len(told) > 1) + says + seen, "claims")
+        if gaps:
+            says += f"; {min(gaps):.3g} s seen"
+        elif _verdict(traces) == "yes":
+            says += "; no robot triggered twice"
+        yield Check("Zeno-free?", mark, f"{', '.join(names)}: {says}" if len(told) > 1 else says, "claims")
     if not told:
         yield Check("Zeno-free?", "open", "not checked", "claims")
 
@@ -262,22 +275,27 @@ def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
         if run
     )
     for (zeta, rule), runs in of.items():
-        exact, timing = ([run.claim(each) for run in runs] for each in (rules.CROSSINGS, rules.TIMING))
-        found = [claim.evidence for claim in timing if "counts" in claim.evidence]
-        mark, fired = _verdict([*exact, *timing]), sum(run.triggers for run in runs)
+        exact, timing = ([run.claim(rule) for run in runs] for rule in (rules.CROSSINGS, rules.TIMING))
+        timed = [claim.evidence for claim in timing if "counts" in claim.evidence]
+        mark = _verdict([*exact, *timing])
+        fired = sum(run.triggers for run in runs)
         says = [f"{counted(fired, 'trigger')} at {zeta:.3g} m ({rules.THRESHOLDS.get(rule, rule)})"]
         if not fired:
             most = [ugv["largest_decision_variable_m"] for claim in exact for ugv in claim.evidence.get("ugvs", ())]
             says += [f"{value:.3g} m reached" for value in sorted(most)[-1:]]
             mark = "none" if mark == "yes" else mark
-        says += [f"{sum(each['counts'][kind] for each in found)} {kind}" for kind in ("false", "missed") if found]
-        off_s = [abs(each[kind]["late_s"]) for each in found for kind in ("latest", "earliest") if each[kind]]
-        says += [f"at most {max(off_s, default=0.0):.2f} s off"] * bool(found and fired)
+        says += [f"{sum(entry['counts'][kind] for entry in timed)} {kind}" for kind in ("false", "missed") if timed]
+        off_s = [abs(entry[kind]["late_s"]) for entry in timed for kind in ("latest", "earliest") if entry[kind]]
+        if timed and fired:
+            says.append(f"at most {max(off_s, default=0.0):.2f} s off")
         above = list(dict.fromkeys(ugv for run in runs for ugv in run.run.metrics.above_at_start))
-        says += [f"{_named(above)} above it from the start"] * bool(above)
+        if above:
+            says.append(f"{_named(above)} above it from the start")
         wrong = [run.name for run, claim in zip(runs, exact, strict=True) if claim.status == "refuted"]
-        says += [f"{', '.join(wrong)}: not when the decision variable says"] * bool(wrong)
-        says += ["not known whether all are in time"] * (mark == "open")
+        if wrong:
+            says.append(f"{', '.join(wrong)}: not when the decision variable says")
+        if mark == "open":
+            says.append("not known whether all are in time")
         yield Check("Threshold correct?", mark, ", ".join(says), "intervened")
 
 
@@ -317,10 +335,10 @@ def _beware(report: Report, rows: Sequence[Row]) -> list[str]:
 
 def _real(report: Report) -> str:
     """That real robots and other starts may differ; with what a user's plant showed of what it declares."""
-    own = [each for claim in report.about(rules.CONDITIONS) for each in claim.evidence.get("own_plants", ())]
+    own = [plant for claim in report.about(rules.CONDITIONS) for plant in claim.evidence.get("own_plants", ())]
     if not own:
         return "other starts or real robots end so, too: arrival is only seen, and sensing is perfect here"
-    most = max(own, key=lambda each: float(each["cover_m"]))
+    most = max(own, key=lambda plant: float(plant["cover_m"]))
     return (
         "other starts or real robots end so, too: {robot} showed {drift_m_s:.2g} of {declared_drift_m_s:.3g} m/s drift "
         "and {cover_m:.3g} of {declared_cover_m:.3g} m cover here"
@@ -332,14 +350,18 @@ def declared(report: Report) -> Cell:
     overall = report.overall
     refuted = sum(claim.status == "refuted" and claim.as_expected is True for claim in report.claims)
     told = [f"{overall.as_expected} of {counted(overall.checks, 'check')} came out as the scenario declares"]
-    told[0] += f" (failures among them: {refuted})" * bool(refuted)
+    if refuted:
+        told[0] += f" (failures among them: {refuted})"
     wrong = [*overall.differs, *overall.undecided, *overall.missing]
     subjects = {claim.id: claim.subject for claim in report.claims}
-    names = [f"{each.run or 'model'}: {subjects.get(each.id) or each.id or 'run'} "
-             f"{rules.CAME_OUT.get(each.status, each.status)}" for each in wrong]  # fmt: skip
+    names = [f"{claim.run or 'model'}: {subjects.get(claim.id) or claim.id or 'run'} "
+             f"{rules.CAME_OUT.get(claim.status, claim.status)}" for claim in wrong]  # fmt: skip
     names += [f"finding {number} about the paper not demonstrated" for number in overall.undemonstrated]
-    told += [f"{', '.join(names[:3])}{f' and {len(names) - 3} more' * (len(names) > 3)}"] * bool(names)
-    more = len(overall.unpromised)
-    told += [f"{counted(more, 'more check')}: nothing is promised"] * (more > 0)
+    if names:
+        told.append(", ".join(names[:3]))
+    if len(names) > 3:
+        told[-1] += f" and {len(names) - 3} more"
+    if more := len(overall.unpromised):
+        told.append(f"{counted(more, 'more check')}: nothing is promised")
     mark = {"as_expected": "yes", "not_as_expected": "no"}.get(overall.status, "open")
     return Cell(mark, told)

@@ -64,10 +64,10 @@ def _other_versions(provenance: Mapping[str, Any]) -> str:
     return f"; made with {'; '.join(other)}" if other else ""
 
 
-def _line(claim: str, run: str, found: Difference | None, exactly: str, note: str) -> Line:
-    if found is None:
+def _line(claim: str, run: str, difference: Difference | None, exactly: str, note: str) -> Line:
+    if difference is None:
         return line_of(claim, run, AGREES, exactly)
-    about, theirs, ours = found
+    about, theirs, ours = difference
     text = f"{about or 'it'} is {short(ours)} here, recorded {short(theirs)}{note}"
     values = {"about": about, "recorded": theirs, "recomputed": ours}
     return line_of(claim, run, NOT_HERE, text, "the same scenario gives the same run") | json.loads(json.dumps(values))
@@ -78,8 +78,8 @@ def _third_party(
 ) -> Iterator[Line]:
     """The verdicts of the claims that the scenario adds, judged again."""
     verdicts = judge_all(scenario, traces.values(), claims=scenario.claims)
-    made = {(each.claim.id, each.run): json.loads(json.dumps(each.to_json())) for each in verdicts}
-    recorded = {(each["id"], each["run"]): dict(each) for each in claims if each["id"] in scenario.claims}
+    made = {(verdict.claim.id, verdict.run): json.loads(json.dumps(verdict.to_json())) for verdict in verdicts}
+    recorded = {(claim["id"], claim["run"]): dict(claim) for claim in claims if claim["id"] in scenario.claims}
     for key in {**recorded, **made}:
         theirs, ours = recorded.get(key), made.get(key)
         if theirs is not None and ours is not None:

@@ -27,18 +27,19 @@ HELD_M_S = AT_REST_M / AT_REST_S
 def stalls(trace: Trace) -> list[dict[str, Any]]:
     """Where UGVs stood for `AT_REST_S` or longer short of their targets, by time; before a UGV's first collision."""
     # Nobody holds a UGV that waits as its proposal asks.
-    found = list[dict[str, Any]]()
+    waits = list[dict[str, Any]]()
     for ugv in trace.ugvs:
         if standing := _standing(trace, ugv):
             given = inequalities_of(trace, ugv)
-            found += [_stall(trace, ugv, first, last, given) for first, last in standing]
-    return sorted(found, key=lambda stall: float(stall["from_s"]))
+            waits += [_stall(trace, ugv, first, last, given) for first, last in standing]
+    return sorted(waits, key=lambda stall: float(stall["from_s"]))
 
 
 def _standing(trace: Trace, ugv: str) -> list[tuple[int, int]]:
     """First and last control sample of each stall of a UGV."""
     rows = trace.sample_rows[trace.sample_rows < trace.counting_rows(ugv)]
-    place, window = trace.position(ugv)[rows], round(AT_REST_S / trace.scenario.control.period_s)
+    place = trace.position(ugv)[rows]
+    window = round(AT_REST_S / trace.scenario.control.period_s)
     if len(rows) <= window:
         return []
     seen = pd.DataFrame(place).rolling(window + 1)
@@ -47,12 +48,14 @@ def _standing(trace: Trace, ugv: str) -> list[tuple[int, int]]:
     for end in ends.tolist():
         still[end - window : end + 1] = 1
     edges = np.flatnonzero(np.diff(still, prepend=0)).reshape(-1, 2) - [0, 1]
-    target, tolerance = trace.scenario.ugvs[ugv].target_m, trace.scenario.arrival_tolerance_m
+    target = trace.scenario.ugvs[ugv].target_m
+    tolerance = trace.scenario.arrival_tolerance_m
     return [(first, last) for first, last in edges.tolist() if np.linalg.norm(place[last] - target) > tolerance]
 
 
 def _stall(trace: Trace, ugv: str, first: int, last: int, given: Inequalities) -> dict[str, Any]:
-    times, to_the_end = trace.sampled("t_s"), last == len(trace.sample_rows) - 1
+    times = trace.sampled("t_s")
+    to_the_end = last == len(trace.sample_rows) - 1
     return {
         "robot": ugv,
         "from_s": float(times[first]),
@@ -81,8 +84,10 @@ def _held_by(trace: Trace, ugv: str, sample: int, given: Inequalities) -> list[s
 
 def _wish(trace: Trace, ugv: str, sample: int) -> Array:
     """Where a UGV would go without avoidance, (3,), m/s: its proposal's way if it executes one, else its own task."""
-    place, number = trace.position(ugv)[trace.sample_rows[sample]], int(trace.sampled(f"{ugv}.executing")[sample])
-    gain, t_s = trace.scenario.control.motion_gain_1_s, float(trace.sampled("t_s")[sample])
+    place = trace.position(ugv)[trace.sample_rows[sample]]
+    number = int(trace.sampled(f"{ugv}.executing")[sample])
+    gain = trace.scenario.control.motion_gain_1_s
+    t_s = float(trace.sampled("t_s")[sample])
     if number >= 0:
         try:
             sent = proposal_of(trace, number)

@@ -22,10 +22,10 @@ def text(report: Report) -> str:
     for mark, told in screen.headline:
         lines += wrap(one_line(f"[{MARKS[mark].icon}] {told}"), WIDTH, subsequent_indent="    ")
     titles = ("Run", "Safe? (nearest approach)", f"Arrived? ({screen.within})", "UAV proposals")
-    runs = [[Cell("", [each]) for each in titles]]
+    runs = [[Cell("", [title]) for title in titles]]
     runs += [[Cell("", [f"{row.run}: {row.says}"]), row.safe, row.arrived, row.uav] for row in screen.rows]
     below = [(check.question, Cell(check.mark, [check.told])) for check in screen.checks]
-    below += [("Do not conclude", Cell("", [f"that {each}" for each in screen.beware]))]
+    below += [("Do not conclude", Cell("", [f"that {warning}" for warning in screen.beware]))]
     below += [("As declared?", screen.declared)]
     asked = [question for question, _ in below]
     first = [question if question not in asked[:k] else "" for k, question in enumerate(asked)]
@@ -46,8 +46,8 @@ def _table(rows: Sequence[Sequence[Cell]], widths: Sequence[int]) -> list[str]:
 
 def _wrapped(cell: Cell, width: int) -> list[str]:
     indent = "  " if cell.mark else ""
-    found = []
+    lines = []
     for k, line in enumerate(cell.lines):
         begin = f"{MARKS[cell.mark].icon} " if cell.mark and not k else indent
-        found += wrap(unbroken(one_line(line)), width, initial_indent=begin, subsequent_indent=f"{indent}  ")
-    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in found]
+        lines += wrap(unbroken(one_line(line)), width, initial_indent=begin, subsequent_indent=f"{indent}  ")
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]

@@ -53,8 +53,8 @@ class PairBudget(NamedTuple):
         told = []
         for key in dict.fromkeys(term.key for term in self.terms):
             parts = [term.metres for term in self.terms if term.key == key]
-            each = f"{parts[0]:.3f} m each" if len(parts) == 2 and parts[0] == parts[1] else f"{sum(parts):.3f} m"
-            told.append(f"{key} {each}")
+            taken = f"{parts[0]:.3f} m each" if len(parts) == 2 and parts[0] == parts[1] else f"{sum(parts):.3f} m"
+            told.append(f"{key} {taken}")
         return ", ".join(told)
 
 
@@ -75,8 +75,8 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
         both = bounds[first], bounds.get(second, AT_REST)
         names, passive = (first, second, ""), kind == "moving"
         terms = [
-            Term(cover[names[each.of]] if each.term == "cover" else KEYS[each.term], names[each.of], each.metres)
-            for each in costs(promised + radii, *both, gain=gain, passive=passive)
+            Term(cover[names[term.of]] if term.term == "cover" else KEYS[term.term], names[term.of], term.metres)
+            for term in costs(promised + radii, *both, gain=gain, passive=passive)
         ]
         law = float(law_distance(promised + radii, *both, gain=gain, passive=passive))
         start = _start(bounds[first], promised, law - radii) if kind == "obstacle" and appears.get(second) else ""
@@ -84,14 +84,14 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
 
     appears = {name: obstacle.appears_s for name, obstacle in scenario.obstacles.items()}
     radius = {name: robot.radius_m for name, robot in scenario.robots.items()}
-    for one in scenario.robots:
-        for name, each in scenario.barriers.items():
-            kind = "moving" if each.expected_speed_m_s else "obstacle"
-            yield of_pair(one, name, kind, gap_m(scenario, each), radius[one] + each.radius_m)
-    for one, other in combinations(scenario.robots, 2):
-        with_uav = scenario.uav.name in (one, other)
+    for first in scenario.robots:
+        for name, barrier in scenario.barriers.items():
+            kind = "moving" if barrier.expected_speed_m_s else "obstacle"
+            yield of_pair(first, name, kind, gap_m(scenario, barrier), radius[first] + barrier.radius_m)
+    for first, second in combinations(scenario.robots, 2):
+        with_uav = scenario.uav.name in (first, second)
         promised = safe.air_ground_m if with_uav else safe.ugv_m
-        yield of_pair(one, other, "air_ground" if with_uav else "ugv", promised, radius[one] + radius[other])
+        yield of_pair(first, second, "air_ground" if with_uav else "ugv", promised, radius[first] + radius[second])
 
 
 def _start(robot: Bounds, promised_m: float, gap_m: float) -> str:

@@ -16,7 +16,7 @@ PERIODS = 1e-9  # share of a control period that counts as rounding
 def course(moves: Moves, period_s: float, until_s: float) -> Motion:
     """Where the origin of the obstacle's frame is, up to a time, s; then it rests."""
     # Every leg takes a whole number of control periods, so that the motion is straight between control samples.
-    corners = [np.array(each) for each in moves.waypoints_m]
+    corners = [np.array(corner) for corner in moves.waypoints_m]
     ahead = list(pairwise(corners))
     back = {"stop": [], "reverse": list(pairwise(corners[::-1])), "loop": [(corners[-1], corners[0])]}[moves.at_end]
     legs = cycle(ahead + back) if back else chain(ahead)

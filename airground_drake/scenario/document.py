@@ -79,7 +79,7 @@ class _Loader(yaml.BaseLoader):
         assert node is not None
         self.depth -= 1
         if not isinstance(event, yaml.AliasEvent):
-            inner = [self.sizes[id(each)] for each in _within(node)]
+            inner = [self.sizes[id(child)] for child in _within(node)]
             self.sizes[id(node)] = 1 + sum(n for n, _ in inner), 1 + max((levels for _, levels in inner), default=0)
         elif id(node) not in self.sizes:  # an alias of a node around it
             raise _excess(_where(event), deep=True)
@@ -149,8 +149,8 @@ def _composed(text: str, source: str) -> yaml.Node:
     try:
         root: yaml.Node | None = _Loader(text, source).get_single_node()
     except (yaml.YAMLError, ValueError, OverflowError) as error:
-        if isinstance(error, yaml.MarkedYAMLError) and (found := hints.slip(error, text)):
-            raise ScenarioError(f"{source}:{found.line}", "", Fault(f"not YAML: {found.what}"), found.wanted) from None
+        if isinstance(error, yaml.MarkedYAMLError) and (slip := hints.slip(error, text)):
+            raise ScenarioError(f"{source}:{slip.line}", "", Fault(f"not YAML: {slip.what}"), slip.wanted) from None
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark else text.count("\n", 0, getattr(error, "position", 0)) + 1
         problem = getattr(error, "problem", None) or getattr(error, "reason", None)
@@ -172,10 +172,10 @@ def of_data(data: Any, source: str) -> Document:
 def simple(value: Any) -> Any:
     """A copy with plain numbers and lists in place of tuples and of numpy's values."""
     if isinstance(value, Mapping):
-        return {str(name): simple(each) for name, each in value.items()}
+        return {str(name): simple(item) for name, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return simple(value.tolist())
-    return [simple(each) for each in value] if isinstance(value, list | tuple) else value
+    return [simple(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def replace(document: Document, override: str) -> None:
@@ -191,26 +191,28 @@ def replace(document: Document, override: str) -> None:
 def place_of(key: str) -> tuple[str, ...]:
     """The names and indices of a dotted key."""
     at = tuple(key.strip().split("."))
-    return at[:3] + (".".join(at[3:]),) * (len(at) > 3) if at[::2][:2] == ("runs", "set") else at  # its keys have dots
+    if len(at) > 3 and at[::2][:2] == ("runs", "set"):
+        return *at[:3], ".".join(at[3:])  # its keys have dots
+    return at
 
 
 def way(data: Any, key: str) -> list[Any]:
     """The values of a document that a dotted key leads through, as far as they are there."""
-    found = []
+    values = []
     for part in place_of(key):
         if isinstance(data, list):
             data = dict(zip(map(str, range(len(data))), data, strict=True))
         if not isinstance(data, dict) or part not in data:
             break
         data = data[part]
-        found.append(data)
-    return found
+        values.append(data)
+    return values
 
 
 def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
     """Change a document: put another value at a place."""
     data = document.data
-    for place in [each for each in document.places if each[: len(at)] == at]:
+    for place in [written for written in document.places if written[: len(at)] == at]:
         del document.places[place]
     for depth, name in enumerate(at, start=1):
         options = [*data] if isinstance(data, dict) else [*map(str, range(len(data if isinstance(data, list) else ())))]
@@ -267,10 +269,10 @@ def _entries_of(node: yaml.Node, key: str) -> Children:
     if "<<" in entries:
         _, template = entries.pop("<<")
         parts = [entries]  # by precedence
-        for each in template.value if isinstance(template, yaml.SequenceNode) else [template]:
-            if not isinstance(each, yaml.MappingNode):
-                raise ScenarioError(_where(each), _dotted(key, "<<"), _value_of(each), "wanted: mappings to merge")
-            parts.append(_entries_of(each, key))
+        for part in template.value if isinstance(template, yaml.SequenceNode) else [template]:
+            if not isinstance(part, yaml.MappingNode):
+                raise ScenarioError(_where(part), _dotted(key, "<<"), _value_of(part), "wanted: mappings to merge")
+            parts.append(_entries_of(part, key))
         entries = dict(entry for part in reversed(parts) for entry in part.items())
     return entries
 

@@ -112,15 +112,18 @@ def within(scenario: Scenario, limits: Limits, times: int = 1) -> Estimate:
     """The estimate of a validated scenario that keeps to the limits."""
     # limits: what it may ask for.
     once = estimate(scenario)
-    found = Estimate._make([*(times * count for count in once[:-1]), once.memory])
-    if not (found.work <= limits.work and found.memory <= limits.memory):
-        raise LimitError(scenario.name, str(found), f"{limits.work:.2g} steps, {limits.memory / GIB:.2g} GiB")
-    return found
+    total = Estimate._make([*(times * count for count in once[:-1]), once.memory])
+    if not (total.work <= limits.work and total.memory <= limits.memory):
+        raise LimitError(scenario.name, str(total), f"{limits.work:.2g} steps, {limits.memory / GIB:.2g} GiB")
+    return total
 
 
 def _of_run(scenario: Scenario, run: Run) -> Estimate:
-    gate, h, duration = scenario.gatekeeper, scenario.control.period_s, scenario.duration_s
-    n, m = len(scenario.ugvs), len(scenario.obstacles) + len(scenario.uav.phantoms_m)
+    gate = scenario.gatekeeper
+    h = scenario.control.period_s
+    duration = scenario.duration_s
+    n = len(scenario.ugvs)
+    m = len(scenario.obstacles) + len(scenario.uav.phantoms_m)
     points, by_outcome = n + m, not METHODS[run.method].intervention_on_top
     rows = duration / min(h, scenario.decision.noise_period_s) + 1.0
     columns = 1 + 6 * (n + 1) + 10 * n

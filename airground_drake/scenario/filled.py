@@ -32,7 +32,9 @@ def _rank(error: ErrorDetails) -> int:
 
 def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schema) -> ScenarioError:
     """An error of pydantic as one line: place, key, value, and what is allowed."""
-    kind, given, says = error["type"], error["input"], error.get("ctx", {})
+    kind = error["type"]
+    given = error["input"]
+    says = error.get("ctx", {})
     loc = [str(part) for part in error["loc"]]
     if json_schema.kinds_at(schema, *loc[:-1]):  # it is no mapping that could have a kind
         del loc[-1]
@@ -47,8 +49,8 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
     place = loc[:-2] + loc[-1:] if loc[-1:] == [json_schema.NAMES] else loc
     wanted = f"wanted: {json_schema.wanted_at(schema, *place)}"
     if kind == "missing":
-        new = f", as {'.'.join(at[:-1])} is new" * source.startswith("--set ")
-        return ScenarioError(source, key, Fault("missing"), wanted + new)
+        wanted += f", as {'.'.join(at[:-1])} is new" if source.startswith("--set ") else ""
+        return ScenarioError(source, key, Fault("missing"), wanted)
     if given is None:
         given = Fault("no value is given")
     elif isinstance(given, dict):
@@ -62,7 +64,8 @@ def _in_words(error: ErrorDetails, document: Document, schema: json_schema.Schem
 
 def _of_another_kind(source: str, key: str, kind: str, kinds: dict[str, list[str]]) -> ScenarioError:
     """The error of a key that a mapping of its kind does not have; all kinds with their keys."""
-    part, default = key.rpartition(".")[2], f"{kind}, the default" if kind == next(iter(kinds)) else kind
+    part = key.rpartition(".")[2]
+    default = f"{kind}, the default" if kind == next(iter(kinds)) else kind
     others = [name for name, keys in kinds.items() if part in keys]
     hint = f"it is a key of {' and '.join(others)}; " if others else suggestion(part, kinds[kind])
     return ScenarioError(source, key, UNKNOWN_KEY, f"{hint}keys of {default}: {', '.join(kinds[kind])}")
@@ -70,7 +73,7 @@ def _of_another_kind(source: str, key: str, kind: str, kinds: dict[str, list[str
 
 def _as_written(data: Any, at: list[str]) -> list[str]:
     """The way to a value without what pydantic adds: the number 0 of a mapping that stands for a list, and kinds."""
-    found = list[str]()
+    written = list[str]()
     for k, part in enumerate(at):
         if isinstance(data, dict):
             if part not in data and k < len(at) - 1:
@@ -78,5 +81,5 @@ def _as_written(data: Any, at: list[str]) -> list[str]:
             data = data.get(part)
         elif isinstance(data, list):
             data = data[int(part)] if part.isdecimal() and int(part) < len(data) else None
-        found.append(part)
-    return found
+        written.append(part)
+    return written

@@ -63,14 +63,14 @@ class Imported(NamedTuple):
 
 def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes, height_m: float) -> Imported:
     """The scenario of a Gazebo world; without robots, one goes where the BARN challenge asks it to go."""
-    # What begins above the height of UGVs is no obstacle of theirs: it is left out, and the UAV flies over it.
+    # Objects that begin above the height of UGVs do not stand in their way: they are left out; the UAV flies over them.
     world = gazebo.world(_text(path), str(path))
-    left_out = [f"left out: {each}" for each in world.left_out]
+    left_out = [f"left out: {model}" for model in world.left_out]
     if not world.solids:
         allowed = "wanted: a world with cylinders, spheres or boxes in its models"
         raise ScenarioError(str(path), "", Fault("; ".join(["no obstacle is in it", *left_out])), allowed)
     robots = robots or [Robot("ugv1", *BARN)]
-    taken = {each.name for each in robots} | {"uav"}
+    taken = {robot.name for robot in robots} | {"uav"}
     lines = list[str]()
     for solid in world.solids:
         if solid.bottom > height_m:
@@ -87,7 +87,7 @@ def barn(path: Path, name: str, robots: Sequence[Robot], sizes: Sizes, height_m:
     says = [f"{len(lines)} obstacle{'' if len(lines) == 1 else 's'}", *dict.fromkeys(left_out)]
     top = max(solid.top for solid in world.solids)
     extent = max(max(map(abs, solid.pose[:2])) + math.hypot(*solid.size) for solid in world.solids)
-    longest = max(math.dist(each.start, each.target) for each in robots)
+    longest = max(math.dist(robot.start, robot.target) for robot in robots)
     lines = ["obstacles:", *lines] if lines else []
     return _scenario(path, name, robots, sizes, says, lines, _Space(2.0 * longest, extent, top))
 
@@ -96,14 +96,14 @@ def ros_map(path: Path, name: str, folder: Path, robots: Sequence[Robot], count:
     """The scenario of a map_server's map; without robots, some are put where they have room and a way."""
     # folder: in which the scenario will be; the map is named from there.
     # robots: the UGVs; may be empty.
-    found = map_file.read(path)
-    grid = found.grid()
+    read = map_file.read(path)
+    grid = read.grid()
     rows, columns = grid.occupied.shape
     says = [
-        f"{columns} x {rows} cells of {grid.frame.cell_m:g} m: {found.cells.occupied.sum()} occupied, "
-        f"{found.cells.unknown.sum()} unknown"
+        f"{columns} x {rows} cells of {grid.frame.cell_m:g} m: {read.cells.occupied.sum()} occupied, "
+        f"{read.cells.unknown.sum()} unknown"
     ]
-    longest = 2.0 * max((math.dist(each.start, each.target) for each in robots), default=0.0)
+    longest = 2.0 * max((math.dist(robot.start, robot.target) for robot in robots), default=0.0)
     if not robots:
         needed = sizes.radius_m + sizes.distance_m + grid.frame.cell_m
         try:
@@ -136,8 +136,8 @@ def mapf(
         raise ScenarioError(str(path), "", Fault("no agent is in it"), "wanted: a scenario of MovingAI")
     map_path = map_path or path.parent / PureWindowsPath(named).name  # which knows both kinds of slashes
     cells = movingai.cells(_text(map_path), str(map_path))
-    found = movingai.agents(text, str(path), cells)
-    moving = [each for each in found if each.start != each.goal]
+    listed = movingai.agents(text, str(path), cells)
+    moving = [agent for agent in listed if agent.start != agent.goal]
     if len(moving) < agents:
         fault = Fault(f"{len(moving)} agents with a way to go")
         raise ScenarioError(str(path), "", fault, f"--agents {agents} needs as many")
@@ -145,8 +145,8 @@ def mapf(
     def middle(cell: tuple[int, int]) -> Point:
         return _point([(index + 0.5) * cell_m for index in cell])
 
-    robots = [Robot(f"ugv{n}", middle(each.start), middle(each.goal)) for n, each in enumerate(moving[:agents], 1)]
-    longest = max(sum(map(abs, np.subtract(each.target, each.start))) for each in robots)
+    robots = [Robot(f"ugv{n}", middle(agent.start), middle(agent.goal)) for n, agent in enumerate(moving[:agents], 1)]
+    longest = max(sum(map(abs, np.subtract(robot.target, robot.start))) for robot in robots)
     rows, columns = cells.shape
     says = [f"{columns} x {rows} cells of {cell_m:g} m: {cells.sum()} in the way", f"the first {agents} agents"]
     image, about = folder / f"{name}_map.pgm", folder / f"{name}_map.yaml"
@@ -214,20 +214,20 @@ def _scenario(
     radius, distance = sizes.radius_m, sizes.distance_m
     altitude = max(2.0, space.top + max(CLEARANCE_M, 2.0 * distance), 2.0 * (radius + distance))
     air_ground = min(0.5 * altitude - radius, max(CLEARANCE_M, distance))
-    places = [altitude, *(abs(place) for each in robots for place in (*each.start, *each.target))]
+    places = [altitude, *(abs(place) for robot in robots for place in (*robot.start, *robot.target))]
     pace = _pace(sizes, space._replace(extent=max(space.extent, *places)), air_ground)
     speed = pace.ugv / RESERVE
     says = [*says, f"UGVs drive at {_number(speed)} m/s, at most at {_number(pace.ugv)} m/s (--max-speed-m-s)"]
     if pace.duration < pace.needed:
         short = f"runs end after {_number(pace.duration)} s, the longest that rounding allows in a world of this size"
         says.append(f"{short}; the longest way may take {_number(pace.needed)} s")
-    middle = np.mean([each.start for each in robots], axis=0)
+    middle = np.mean([robot.start for robot in robots], axis=0)
     kept = f"UGVs have a radius of {_number(radius)} m, and keep {_number(distance)} m from others"
     comments = [f"Made by `airground import` of {path.name}", *says, f"{kept}; presets are straight"]
     lines = [
-        *(f"# {one_line(each)}" for each in comments),
+        *(f"# {one_line(comment)}" for comment in comments),
         f'name: "{name}"',
-        text_of({"title": one_line(f"{len(robots)} UGV{'s' * (len(robots) > 1)} in {path.name}")}).strip(),
+        text_of({"title": one_line(f"{len(robots)} {'UGVs' if len(robots) > 1 else 'UGV'} in {path.name}")}).strip(),
         f"duration_s: {_number(pace.duration)}",
         "",
         "uav:",
@@ -306,5 +306,5 @@ def _list(values: Sequence[float]) -> str:
 
 
 def _point(values: Sequence[float]) -> Point:
-    x, y = (round(each, 6) for each in values)
+    x, y = (round(value, 6) for value in values)
     return x, y

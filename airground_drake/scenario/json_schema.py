@@ -47,7 +47,7 @@ def scenario_schema(*, installed: bool = True) -> Schema:
 
 def class_of(name: str) -> type:
     """The dataclass of a definition."""
-    return next((each for each in KEYS.values() if each.__name__ == name), None) or getattr(schema, name)
+    return next((keys for keys in KEYS.values() if keys.__name__ == name), None) or getattr(schema, name)
 
 
 def _adapted(part: Any, installed: bool) -> Any:
@@ -55,10 +55,10 @@ def _adapted(part: Any, installed: bool) -> Any:
     if isinstance(part, Registry):
         return [*part] if installed else [*part.own]
     if isinstance(part, list):
-        return [each for each in (_adapted(each, installed) for each in part) if each != {"enum": []}]
+        return [kept for kept in (_adapted(item, installed) for item in part) if kept != {"enum": []}]
     if not isinstance(part, dict):
         return part
-    says = {name: _adapted(each, installed) for name, each in part.items() if name != "title" or isinstance(each, dict)}
+    says = {name: _adapted(of, installed) for name, of in part.items() if name != "title" or isinstance(of, dict)}
     if entries := says.get("patternProperties", {}).pop(NAME_PATTERN, None):
         del says["patternProperties"]
         says |= {"propertyNames": _NAMES, "additionalProperties": entries}
@@ -70,8 +70,8 @@ def _adapted(part: Any, installed: bool) -> Any:
 
 def _expectations(claims: Registry, installed: bool) -> Schema:
     """Expected verdicts by claim."""
-    one = "|".join(EXPECTATIONS)
-    verdict = {"anyOf": [{"enum": [*EXPECTATIONS, NOTHING]}, {"type": "string", "pattern": f"^({one})( or ({one}))*$"}]}
+    pattern = "^({0})( or ({0}))*$".format("|".join(EXPECTATIONS))
+    verdict = {"anyOf": [{"enum": [*EXPECTATIONS, NOTHING]}, {"type": "string", "pattern": pattern}]}
     known: Schema = {name: {"description": claims.says(name), **verdict} for name in _adapted(claims, installed)}
     if claims is RUN_CLAIMS:
         number: Schema = {"type": "integer", "minimum": 1, "maximum": MAX_SEED}
@@ -103,7 +103,7 @@ def _object(kind: type, made: Schema) -> Schema:
 
 def _types(says: Schema) -> list[str]:
     """The types among which a value may choose."""
-    return [str(each.get("type")) for each in says.get("anyOf", ())]
+    return [str(choice.get("type")) for choice in says.get("anyOf", ())]
 
 
 def keys_at(whole: Schema, *at: str) -> list[str]:
@@ -113,7 +113,7 @@ def keys_at(whole: Schema, *at: str) -> list[str]:
 
 def kinds_at(whole: Schema, *at: str) -> dict[str, list[str]]:
     """Keys of the mappings among which a kind chooses at a place in a file with this schema, by kind; {} elsewhere."""
-    parts = [whole["$defs"][each["$ref"].rpartition("/")[2]] for each in _at(whole, at)[0].get("oneOf", ())]
+    parts = [whole["$defs"][choice["$ref"].rpartition("/")[2]] for choice in _at(whole, at)[0].get("oneOf", ())]
     return {kind_of(part): [key for key in part["properties"] if key != "<<"] for part in parts}
 
 
@@ -162,8 +162,8 @@ def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
         if part.isdecimal() and says.keys() & {"properties", "oneOf"}:  # one entry of a list may stand for the list
             continue
         if "oneOf" in says:
-            parts = (whole["$defs"][each["$ref"].rpartition("/")[2]] for each in says["oneOf"])
-            says = next(each for each in parts if kind_of(each) == part)
+            parts = (whole["$defs"][choice["$ref"].rpartition("/")[2]] for choice in says["oneOf"])
+            says = next(choice for choice in parts if kind_of(choice) == part)
             continue
         inner = says.get("properties", {}).get(part)
         if inner is not None or not unit_of(name):
@@ -171,6 +171,6 @@ def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
         if part == NAMES:
             inner = says["propertyNames"]["anyOf"][0]
         says = inner or says.get("items") or says.get("additionalProperties") or {}
-        says = next((each for each in says.get("anyOf", ()) if each.keys() & {"$ref", "oneOf"}), says)  # else null
+        says = next((kind for kind in says.get("anyOf", ()) if kind.keys() & {"$ref", "oneOf"}), says)  # else null
         says = whole["$defs"][says["$ref"].rpartition("/")[2]] if "$ref" in says else says
     return says, name

@@ -48,8 +48,8 @@ def _sections(schema: Schema, part: Schema, path: str, kind: str = "") -> Iterat
             (".NAME", says.get("additionalProperties") or {}),
             (".N", says.get("items") or {}),
         ):
-            for each in below.get("oneOf", [below] if "$ref" in below else []):
-                inner = schema["$defs"][each["$ref"].rpartition("/")[2]]
+            for choice in below.get("oneOf", [below] if "$ref" in below else []):
+                inner = schema["$defs"][choice["$ref"].rpartition("/")[2]]
                 of = kind_of(inner) if "oneOf" in below else ""
                 yield from _sections(schema, inner, f"{path}.{key}{where}".lstrip("."), of)
 
@@ -59,7 +59,7 @@ def _allowed(key: str, part: Schema) -> str:
     says = part["properties"][key]
     words = [_kind(says)]
     if says.get("type") == "number":
-        words += ["0 or more"] * (says["minimum"] == 0.0) + ["above 0"] * (says["minimum"] > 0.0)
+        words += ["0 or more"] if says["minimum"] == 0.0 else ["above 0"] if says["minimum"] > 0.0 else []
     if says.get("type") == "integer":
         words.append(f"{says['minimum']} to {says['maximum']}")
     if "default" in says and says["default"] not in ({}, [], "", None):
@@ -71,13 +71,13 @@ def _allowed(key: str, part: Schema) -> str:
 
 def _ref(says: Schema) -> Schema:
     """The mapping that may stand under a key, also if nothing may stand there, too."""
-    return next((each for each in says.get("anyOf", ()) if each.keys() & {"$ref", "oneOf"}), says)
+    return next((kind for kind in says.get("anyOf", ()) if kind.keys() & {"$ref", "oneOf"}), says)
 
 
 def _kind(says: dict[str, Any]) -> str:
     says = _ref(says)
     if "anyOf" in says:
-        return ", ".join([*(_kind(each) for each in says["anyOf"] if "enum" in each), PLUGIN])
+        return ", ".join([*(_kind(choice) for choice in says["anyOf"] if "enum" in choice), PLUGIN])
     if "enum" in says:
         return "one of " + ", ".join(f"`{name}`" for name in says["enum"])
     if "const" in says:

@@ -117,7 +117,7 @@ def one_of(options: Iterable[str], place: str = "") -> ValueRule:
 
     def check(value: str) -> str:
         if value not in allowed():
-            raise refused(value, f"one of {', '.join(each or repr(each) for each in allowed())}")
+            raise refused(value, f"one of {', '.join(name or repr(name) for name in allowed())}")
         return value
 
     return ValueRule(check, lambda: {"enum": allowed()})

@@ -130,8 +130,8 @@ class Chosen(NamedTuple):
 
 def _choices(document: Document) -> list[Chosen]:
     listed = document.data.get("choices") if isinstance(document.data, dict) else None
-    entries = [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
-    return [Chosen(each, dict(each), deepcopy(way(document.data, str(each.get("key"))))) for each in entries]
+    entries = [entry for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
+    return [Chosen(entry, dict(entry), deepcopy(way(document.data, str(entry.get("key"))))) for entry in entries]
 
 
 def _mark_set(document: Document, before: Sequence[Chosen]) -> None:
@@ -196,7 +196,7 @@ def _read_map(scenario: Scenario, document: Document) -> None:
     starts = [robot.start_m for robot in scenario.robots.values()]
     given.cells = map_file.cells(given, Path(document.source).parent, starts, document.where("map", "file"))
     cells = dataclasses.fields(given.cells)
-    document.data["map"]["cells"] = {each.name: getattr(given.cells, each.name) for each in cells}
+    document.data["map"]["cells"] = {column.name: getattr(given.cells, column.name) for column in cells}
 
 
 def _rounded_down(gain: float, period: float) -> float:

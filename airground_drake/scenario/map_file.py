@@ -107,22 +107,22 @@ def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
 def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: str, *, copied: bool = False) -> MapCells:
     """What the files of a scenario's map say."""
     # starts: of all robots, [x, y, ...], m; what none of them can reach is filled.
-    found = read(folder / given.file, where, copied=copied)
-    grid = found.grid(unknown=given.unknown == "occupied")
-    starts_m = [[*each[:2]] for each in starts]
+    chart = read(folder / given.file, where, copied=copied)
+    grid = chart.grid(unknown=given.unknown == "occupied")
+    starts_m = [[*start[:2]] for start in starts]
     filled = grid.filled(starts_m)
     rectangles = covering(filled.occupied)
     if len(rectangles) > MAX_RECTANGLES:
         fault = Fault(f"{given.file} needs {len(rectangles)} rectangles")
         raise ScenarioError(where, "map.file", fault, f"at most {MAX_RECTANGLES} are allowed: remove noise, or crop it")
-    digests = {path.name: files.sha256(content) for path, content in found.contents.items()}
-    _contents.update(zip(digests.values(), found.contents.values(), strict=True))
+    digests = {path.name: files.sha256(content) for path, content in chart.contents.items()}
+    _contents.update(zip(digests.values(), chart.contents.values(), strict=True))
     rows, columns = grid.occupied.shape
     return MapCells(
         file=given.file, unknown=given.unknown, sha256=digests, starts_m=starts_m,
         cell_m=grid.frame.cell_m, origin=[*grid.frame.origin],
         rows=rows, columns=columns,
-        occupied=int(found.cells.occupied.sum()), unsure=int(found.cells.unknown.sum()),
+        occupied=int(chart.cells.occupied.sum()), unsure=int(chart.cells.unknown.sum()),
         unreached=int((filled.occupied & ~grid.occupied).sum()),
         rectangles=rectangles.tolist(),
     )  # fmt: skip

@@ -66,7 +66,7 @@ def parser_of(
 ) -> Parser:
     """The parser of a command."""
     # takes: its options and arguments, each with what it has otherwise than the table, None if nothing.
-    # exclusive: options of which at most one may be given.
+    # exclusive: options that exclude each other.
     form = argparse.RawDescriptionHelpFormatter if "\n" in (epilog or "") else argparse.HelpFormatter
     parser = Parser(prog=f"airground {name}", description=description, epilog=epilog, formatter_class=form)
     group = parser.add_mutually_exclusive_group() if exclusive else parser

@@ -18,11 +18,11 @@ def outlines_of(scenario: Scenario, obstacle: Obstacle) -> Array:
         return prisms(corners_of_map(obstacle.cells), top=obstacle.height_m, gap=gap)
     parts = convex_parts(obstacle)
     if parts is None:
-        found = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)
+        rows = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)
     else:
-        found = stacked(prism(part, top=obstacle.height_m, radius=obstacle.radius_m, gap=gap) for part in parts)
-    found[:, SPEED] = obstacle.expected_speed_m_s
-    return found
+        rows = stacked(prism(part, top=obstacle.height_m, radius=obstacle.radius_m, gap=gap) for part in parts)
+    rows[:, SPEED] = obstacle.expected_speed_m_s
+    return rows
 
 
 def gap_m(scenario: Scenario, obstacle: Obstacle) -> float:

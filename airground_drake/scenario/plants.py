@@ -21,13 +21,13 @@ NO_THEOREM = "no theorem covers another combination"
 
 
 def tag_of(given: Any) -> str:
-    """The class that a plant's keys belong to, by its name in `KEYS`; the default's for what is no mapping."""
+    """The name in `KEYS` of the class that a plant's keys belong to; without a mapping, that of the default plant."""
     kind = given.get("kind", AS_TOLD) if isinstance(given, dict) else getattr(given, "kind", AS_TOLD)
     return kind if kind in PLANTS.own else OWN
 
 
 def _known(given: Any, info: ValidationInfo) -> Any:
-    """Refuse a kind that is no name of a plant, whatever the other keys are."""
+    """Refuse a kind that does not name a plant, whatever the other keys are."""
     kind = given.get("kind", AS_TOLD) if isinstance(given, dict) else AS_TOLD
     if isinstance(kind, str) and info.context != RECORDED and not PLANTS.accepts(kind):
         raise refused(kind, f"one of {', '.join(PLANTS.allowed)}{plugin_path(kind)}", "kind")
@@ -51,10 +51,10 @@ class _Robot(Protocol):
 
 def plant_of(robot: _Robot, period_s: float) -> Plant:
     """How a robot moves under its commands, with a control period, s."""
-    found: Plant | None = None
+    plant: Plant | None = None
     for keys in reversed(robot.plant):
-        found = keys.made(period_s, found)
-    return found or FirstOrder()
+        plant = keys.made(period_s, plant)
+    return plant or FirstOrder()
 
 
 def made(given: list[dict[str, Any]], period_s: float) -> Plant:

@@ -40,14 +40,14 @@ def plugins(scenario: Scenario) -> dict[str, str]:
         chosen = {key: str(value) for key, value in spec.set.items()}
         named += [(f"runs.{run}.set.{key}", chosen[key], ROUTES) for key in chosen if key == "gatekeeper.route"]
         named += [(f"runs.{run}.set.{key}", chosen[key], POLICIES) for key in chosen if _POLICY.fullmatch(key)]
-    found = {key: name for key, name, registry in named if name not in registry and is_plugin(name)}
-    return found | {f"claims.{claim}": place for claim, place in scenario.claims.items()}
+    named_own = {key: name for key, name, registry in named if name not in registry and is_plugin(name)}
+    return named_own | {f"claims.{claim}": place for claim, place in scenario.claims.items()}
 
 
 def digests(scenario: Scenario) -> dict[str, str]:
     """SHA-256 of the files of third-party code in a scenario, by its name there; nothing is imported."""
-    found = {name: source_of(name) for name in plugins(scenario).values()}
-    return {name: sha256(file.read_bytes()) for name, file in found.items() if file is not None}
+    sources = {name: source_of(name) for name in plugins(scenario).values()}
+    return {name: sha256(file.read_bytes()) for name, file in sources.items() if file is not None}
 
 
 def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None) -> None:
@@ -98,7 +98,7 @@ def beside(source: str, *, allow: bool) -> Iterator[None]:
 
 def without(scenario: Scenario) -> Scenario:
     """The scenario with the package's own task, route and plants, without policies; its diagram has the same blocks."""
-    plants = {name: [each for each in robot.plant if not each.is_own] for name, robot in scenario.robots.items()}
+    plants = {name: [part for part in robot.plant if not part.is_own] for name, robot in scenario.robots.items()}
     return replace(
         scenario,
         ugvs={name: replace(ugv, plant=plants[name]) for name, ugv in scenario.ugvs.items()},

@@ -572,17 +572,17 @@ class Scenario:
     @property
     def barriers(self) -> dict[str, Obstacle]:
         """The obstacles, the map and the walls of the arena, by name."""
-        found = dict(self.obstacles)
+        bodies = dict(self.obstacles)
         if (given := self.map) is not None and given.cells is not None and given.cells.rectangles:
-            found[MAP] = MapObstacle(
+            bodies[MAP] = MapObstacle(
                 known_to_uav=given.known_to_uav, height_m=given.height_m, distance_m=given.distance_m, cells=given.cells
             )
         if self.arena_m:
             (ax, bx), (ay, by) = (sorted(axis) for axis in zip(*self.arena_m, strict=True))
             corners = [[ax, ay], [bx, ay], [bx, by], [ax, by], [ax, ay]]
             walls = zip(("south", "east", "north", "west"), pairwise(corners), strict=True)
-            found |= {f"{ARENA}{side}": Obstacle(segment_m=list(wall), height_m=ENDLESS_M) for side, wall in walls}
-        return found
+            bodies |= {f"{ARENA}{side}": Obstacle(segment_m=list(wall), height_m=ENDLESS_M) for side, wall in walls}
+        return bodies
 
     @property
     def robots(self) -> dict[str, Ugv | Uav]:

@@ -104,7 +104,7 @@ def split(corners: Sequence[Corner]) -> list[list[Corner]]:
     # Ears are cut off until only triangles are left, and triangles are joined again while the result is convex (Hertel
     # and Mehlhorn 1983): at most four times as many parts as possible.
     around = list(corners) if area(corners) > 0.0 else list(corners)[::-1]
-    parts = [list(each) for each in _triangles(around)] if not _is_convex(around) else [around]
+    parts = [list(triangle) for triangle in _triangles(around)] if not _is_convex(around) else [around]
     return [_without_straight_corners(part) for part in _joined(parts)]
 
 
@@ -139,21 +139,21 @@ def _is_convex(corners: Sequence[Corner]) -> bool:
 
 def _triangles(corners: list[Corner]) -> list[tuple[Corner, Corner, Corner]]:
     """Triangles that together are a polygon."""
-    left, found = list(corners), []
+    left, triangles = list(corners), []
     while len(left) > 3:
         points = np.array(left)
         for k in range(len(left)):
             a, b, c = left[k - 2], left[k - 1], left[k]
             if turn(a, b, c) > 0.0 and not _any_in_triangle(points, a, b, c):
-                found.append((a, b, c))
+                triangles.append((a, b, c))
                 del left[k - 1]
                 break
         else:  # only straight corners are left
             straight = min(range(len(left)), key=lambda k: abs(turn(left[k - 2], left[k - 1], left[k])))
             del left[straight - 1]
     if turn(left[0], left[1], left[2]) > 0.0:
-        found.append((left[0], left[1], left[2]))
-    return found
+        triangles.append((left[0], left[1], left[2]))
+    return triangles
 
 
 def _any_in_triangle(points: Array, a: Corner, b: Corner, c: Corner) -> bool:
@@ -167,13 +167,13 @@ def _any_in_triangle(points: Array, a: Corner, b: Corner, c: Corner) -> bool:
     return bool(inside.any())
 
 
-def _united(one: list[Corner], other: list[Corner]) -> list[Corner] | None:
+def _united(polygon: list[Corner], other: list[Corner]) -> list[Corner] | None:
     """The union of two convex polygons that share an edge, if it is convex."""
     at = {edge: m for m, edge in enumerate(_edges(other), start=1)}
-    for k in range(len(one)):
-        if m := at.get((one[k], one[k - 1])):  # the other polygon goes the other way
+    for k in range(len(polygon)):
+        if m := at.get((polygon[k], polygon[k - 1])):  # the other polygon goes the other way
             m %= len(other)
-            both = [*one[k:], *one[:k], *[*other[m:], *other[:m]][1:-1]]
+            both = [*polygon[k:], *polygon[:k], *[*other[m:], *other[:m]][1:-1]]
             return both if _is_convex(both) else None
     return None
 

@@ -102,11 +102,11 @@ def _shapes(scenario: Scenario) -> Problems:
         yield from _way(key, obstacle, flat=bool(given or obstacle.height_m))
         yield from _corners(f"{key}.segment_m", obstacle.segment_m, 2, closed=False)
         yield from _corners(f"{key}.polygon_m", obstacle.polygon_m, 3, closed=True)
-    if scenario.arena_m and any(one == other for one, other in zip(*scenario.arena_m, strict=True)):
+    if scenario.arena_m and any(low == high for low, high in zip(*scenario.arena_m, strict=True)):
         yield "arena_m", scenario.arena_m, "two opposite corners of a rectangle"
     elif scenario.arena_m:
         low, high = np.min(scenario.arena_m, axis=0), np.max(scenario.arena_m, axis=0)
-        for key, robot in (*((f"ugvs.{name}", each) for name, each in scenario.ugvs.items()), ("uav", scenario.uav)):
+        for key, robot in (*((f"ugvs.{name}", ugv) for name, ugv in scenario.ugvs.items()), ("uav", scenario.uav)):
             for name in ("start_m", "target_m"):
                 place = np.array(getattr(robot, name)[:2])
                 if not ((low < place) & (place < high)).all():
@@ -143,8 +143,8 @@ def _corners(key: str, corners: Sequence[Vector], least: int, *, closed: bool) -
         if math.dist(corners[i], corners[j]) <= TOLERANCE:
             yield f"{key}.{j}", corners[j], "a corner other than the one before it"
     if closed and corners and (met := crossing([(x, y) for x, y in corners])):
-        one, other = (list(corners[k]) for k in met)
-        yield key, corners, f"edges that do not meet: those that end at {one} and at {other} do"
+        first, second = (list(corners[k]) for k in met)
+        yield key, corners, f"edges that do not meet: those that end at {first} and at {second} do"
     elif closed and corners and (thin := near_edge([(x, y) for x, y in corners], TOLERANCE)) is not None:
         allowed = f"a corner more than {TOLERANCE:g} m from the edges that do not end there (segment_m: a thin wall)"
         yield f"{key}.{thin}", corners[thin], allowed
@@ -221,10 +221,11 @@ def _ends(scenario: Scenario) -> Problems:
     """A preset must lead to its target, to within the tolerance, if a run expects the UGV there."""
     # A scenario that ends before a preset does is cut short on purpose: no arrival is expected.
     presets = [ugv.preset for ugv in scenario.ugvs.values()]
-    if max(preset_s(each.waypoints_m, each.speed_m_s) for each in presets) > scenario.duration_s:
+    if max(preset_s(preset.waypoints_m, preset.speed_m_s) for preset in presets) > scenario.duration_s:
         return
     for name, ugv in scenario.ugvs.items():
-        away, end = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m), len(ugv.preset.waypoints_m) - 1
+        away = math.dist(ugv.preset.waypoints_m[-1], ugv.target_m)
+        end = len(ugv.preset.waypoints_m) - 1
         for run, spec in scenario.runs.items():
             admitted = alternatives(spec.expected.get(ARRIVAL, "holds"))
             arrives = name not in spec.stalls_m and {"refuted", NOTHING}.isdisjoint(admitted)
@@ -246,7 +247,9 @@ def _gains(scenario: Scenario) -> Problems:
 
 
 def _periods(scenario: Scenario) -> Problems:
-    control, gatekeeper, noise = scenario.control.period_s, scenario.gatekeeper, scenario.decision.noise_period_s
+    control = scenario.control.period_s
+    gatekeeper = scenario.gatekeeper
+    noise = scenario.decision.noise_period_s
     rule = f"must be a whole multiple of control.period_s = {control:.9g} s"
     if scenario.duration_s < control:
         yield "duration_s", scenario.duration_s, f"at least one control period, control.period_s = {control} s"
@@ -282,10 +285,10 @@ def _distances(scenario: Scenario) -> Problems:
         if not safe.collision_m < getattr(safe, name):
             allowed = f"less than safe_distance.{name} = {getattr(safe, name):.9g} m"
             yield "safe_distance.collision_m", safe.collision_m, allowed
-    for name, each in scenario.barriers.items():
-        if each.distance_m and not safe.collision_m < each.distance_m:
+    for name, body in scenario.barriers.items():
+        if body.distance_m and not safe.collision_m < body.distance_m:
             allowed = f"more than safe_distance.collision_m = {safe.collision_m:.9g} m, or 0"
-            yield f"{_key_of(name)}.distance_m", each.distance_m, allowed
+            yield f"{_key_of(name)}.distance_m", body.distance_m, allowed
     radii = scenario.uav.radius_m + max(ugv.radius_m for ugv in scenario.ugvs.values())
     if not altitude > safe.air_ground_m + radii:
         least = f"safe_distance.air_ground_m = {safe.air_ground_m:.9g} m{_and(radii)}"
@@ -331,16 +334,16 @@ def _nearest_pairs(scenario: Scenario) -> list[tuple[Apart, _Body, _Body]]:
     """For each kind of pairs the pair that needs the most room in a period, with its safe distance."""
     h = scenario.control.period_s
     *ugvs, uav = (
-        _Body(each.radius_m + each.max_speed_m_s * h, each.max_speed_m_s, each.radius_m, name)
-        for name, each in scenario.robots.items()
+        _Body(robot.radius_m + robot.max_speed_m_s * h, robot.max_speed_m_s, robot.radius_m, name)
+        for name, robot in scenario.robots.items()
     )
     ugvs.sort(reverse=True)
     fixed = [
-        _Body(each.radius_m, each.expected_speed_m_s, each.radius_m, name) for name, each in scenario.barriers.items()
+        _Body(body.radius_m, body.expected_speed_m_s, body.radius_m, name) for name, body in scenario.barriers.items()
     ]
     pairs = [(_apart(scenario, "air_ground_m"), uav, ugvs[0])]
-    pairs += [(_apart(scenario, "ugv_m"), one, other) for one, other in pairwise(ugvs[:2])]
-    return [*pairs, *((apart_of(scenario, each.name), max(uav, ugvs[0]), each) for each in fixed)]
+    pairs += [(_apart(scenario, "ugv_m"), first, second) for first, second in pairwise(ugvs[:2])]
+    return [*pairs, *((apart_of(scenario, body.name), max(uav, ugvs[0]), body) for body in fixed)]
 
 
 def _shown(number: Fraction, rounding: str) -> str:
@@ -353,16 +356,16 @@ def _sensing(scenario: Scenario) -> Problems:
     """A body beyond the sensing range must not come within the safe distance in one control period."""
     period = scenario.control.period_s
 
-    def room(apart: Apart, one: _Body, other: _Body) -> Fraction:
-        closing = (decimal(one.speed) + decimal(other.speed)) * decimal(period)
-        return decimal(apart[1] + (one.radius + other.radius)) + closing
+    def room(apart: Apart, first: _Body, second: _Body) -> Fraction:
+        closing = (decimal(first.speed) + decimal(second.speed)) * decimal(period)
+        return decimal(apart[1] + (first.radius + second.radius)) + closing
 
-    needed, (kind, least), one, other = max((room(*pair), *pair) for pair in _nearest_pairs(scenario))
+    needed, (kind, least), first, second = max((room(*pair), *pair) for pair in _nearest_pairs(scenario))
     if decimal(scenario.control.sensing_range_m) < needed:
-        apart = f"{kind} {least:.9g} m{_and(one.radius + other.radius)}"
-        total = f"{apart} + closing {one.speed + other.speed:.9g} m/s * control.period_s {period:.9g} s"
-        allowed = f"at least {_shown(needed, ROUND_CEILING)} m for {one.name} and {other.name}: {total}"
-        allowed += hints.fast(max(one.speed, other.speed))
+        apart = f"{kind} {least:.9g} m{_and(first.radius + second.radius)}"
+        total = f"{apart} + closing {first.speed + second.speed:.9g} m/s * control.period_s {period:.9g} s"
+        allowed = f"at least {_shown(needed, ROUND_CEILING)} m for {first.name} and {second.name}: {total}"
+        allowed += hints.fast(max(first.speed, second.speed))
         yield "control.sensing_range_m", scenario.control.sensing_range_m, allowed
 
 
@@ -372,20 +375,22 @@ def _extent(scenario: Scenario) -> Problems:
     control, duration = scenario.control, scenario.duration_s
     if control.avoidance_gain_1_s == 0.0:
         return
-    speeds = sorted(each.max_speed_m_s for each in scenario.robots.values())
+    speeds = sorted(robot.max_speed_m_s for robot in scenario.robots.values())
     speed, closing = speeds[-1], speeds[-2] + speeds[-1]
     loss = Rounding(control.sensing_range_m, closing, control.period_s, control.avoidance_gain_1_s)
     points: list[tuple[str, Vector]] = []
     for name, ugv in scenario.ugvs.items():
         points += [(f"ugvs.{name}.start_m", ugv.start_m), (f"ugvs.{name}.target_m", ugv.target_m)]
-        points += [(f"ugvs.{name}.preset.waypoints_m.{i}", each) for i, each in enumerate(ugv.preset.waypoints_m)]
+        points += [(f"ugvs.{name}.preset.waypoints_m.{i}", place) for i, place in enumerate(ugv.preset.waypoints_m)]
     points.append(("uav.start_m", scenario.uav.start_m))
-    for name, each in scenario.barriers.items():
-        shape = next((key for key in SHAPES if getattr(each, key)), "position_m")
-        corners = outlines_of(scenario, each)[:, outline.CORNERS :].reshape(-1, 2)  # and zeros
-        places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()] + [each.position_m] * bool(each.position_m)
-        if each.moves:
-            shape, places = "moves.waypoints_m", [*places, *each.moves.waypoints_m]
+    for name, body in scenario.barriers.items():
+        shape = next((key for key in SHAPES if getattr(body, key)), "position_m")
+        corners = outlines_of(scenario, body)[:, outline.CORNERS :].reshape(-1, 2)  # and zeros
+        places = [corners[np.abs(corners).max(axis=1).argmax()].tolist()]
+        if body.position_m:
+            places.append(body.position_m)
+        if body.moves:
+            shape, places = "moves.waypoints_m", [*places, *body.moves.waypoints_m]
         key = f"{_key_of(name)}.{'file' if name == MAP else shape}"
         points += [("arena_m" if name.startswith(ARENA) else key, place) for place in places]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
@@ -415,8 +420,9 @@ def _filled(scenario: Scenario) -> str:
     cells = scenario.map.cells if scenario.map else None
     if cells is None:
         return ""
-    told = [f"{cells.unsure} unknown ones"] * bool(cells.unsure and cells.unknown == "occupied")
-    told += [f"{cells.unreached} free ones that cannot be reached from any start"] * bool(cells.unreached)
+    told = [f"{cells.unsure} unknown ones"] if cells.unsure and cells.unknown == "occupied" else []
+    if cells.unreached:
+        told.append(f"{cells.unreached} free ones that cannot be reached from any start")
     return f" (of whose cells {' and '.join(told)} count as occupied)" if told else ""
 
 
@@ -431,7 +437,7 @@ class _Round(NamedTuple):
 
 def _clearances(scenario: Scenario) -> Problems:
     """No robot may start or end within the safe distance of an obstacle or of another robot."""
-    outlines = {name: outlines_of(scenario, each) for name, each in scenario.barriers.items()}
+    outlines = {name: outlines_of(scenario, body) for name, body in scenario.barriers.items()}
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
         ugvs = [
             _Round(f"ugvs.{name}", name, getattr(ugv, attribute), ugv.radius_m) for name, ugv in scenario.ugvs.items()
@@ -464,7 +470,7 @@ def _too_near(robot: _Round, attribute: str, what: str, kind: str, least: float)
 def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -> Iterator[tuple[_Round, _Round]]:
     """Pairs whose surfaces are nearer than a distance, m. If both lists are the same, each pair comes once."""
     (points, radii), (others, other_radii) = (
-        (np.reshape([each.point for each in group], (-1, 3)), np.array([each.radius for each in group]))
+        (np.reshape([disc.point for disc in group], (-1, 3)), np.array([disc.radius for disc in group]))
         for group in (these, those)
     )
     apart = np.linalg.norm(points[:, None] - others, axis=2)
@@ -485,7 +491,7 @@ def _budget(scenario: Scenario) -> Problems:
         for name, robot in robots.items()
     }
     target = {name: np.array(robot.target_m, dtype=np.float64) for name, robot in robots.items()}
-    outlines = {name: outlines_of(scenario, each) for name, each in scenario.barriers.items()}
+    outlines = {name: outlines_of(scenario, body) for name, body in scenario.barriers.items()}
     for pair in budget(scenario):
         if not pair.terms:
             continue

@@ -21,7 +21,7 @@ def make_world(scenario: Scenario) -> World:
     control = scenario.control
     robots = [_robot(name, "ugv", ugv, control.period_s) for name, ugv in scenario.ugvs.items()]
     robots += [_robot(scenario.uav.name, "uav", scenario.uav, control.period_s)]
-    obstacles = [_obstacle(scenario, name, each) for name, each in scenario.barriers.items()]
+    obstacles = [_obstacle(scenario, name, body) for name, body in scenario.barriers.items()]
     obstacles.sort(key=lambda body: body.plant is None)
     apart: dict[frozenset[Kind], float] = {
         frozenset(("ugv",)): safe.ugv_m,

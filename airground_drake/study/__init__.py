@@ -1,4 +1,4 @@
-"""Many runs, learning, logs of others, users' tests: `campaign`, `environments`, `logs`, `testing`.
+"""Many runs, learning, recorded logs, users' tests: `campaign`, `environments`, `logs`, `testing`.
 
 Enters: scenarios, specs of campaigns, logs.
 Leaves: rows, evidence, environments, verdicts on logs.

@@ -66,10 +66,10 @@ def _line(verdict: Verdict) -> str:
     margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}".rstrip()
     of = f" ({finding.quantity})" if margin and finding.quantity else ""
     idle = outcome(finding.status, finding.exercised) == NOT_EXERCISED
-    found = f"{finding.status}, nothing to check" if idle else finding.status
+    status = f"{finding.status}, nothing to check" if idle else finding.status
     tested = f" [{finding.exercised} {verdict.claim.exercised_by}]" if finding.exercised is not None else ""
     expected = {True: "", False: f", expected {verdict.expected}", None: ", nothing promised"}[verdict.as_expected]
-    return f"{name}: {found}{margin}{of}{tested}{expected}"
+    return f"{name}: {status}{margin}{of}{tested}{expected}"
 
 
 def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plugins: bool) -> list[Verdict]:

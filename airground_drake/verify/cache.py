@@ -38,12 +38,12 @@ def cached_finding(claim: ModelClaim, inputs: dict[str, Any], folder: Path | Non
     path = folder / f"{key(claim, inputs)}.json"
     if (kept := _read(path, claim, inputs)) is not None:
         return kept
-    found = claim.judge(inputs)
-    if found.status in PASSING:
-        made = found.to_json()
+    finding = claim.judge(inputs)
+    if finding.status in PASSING:
+        made = finding.to_json()
         with contextlib.suppress(OSError):  # a folder that cannot be written keeps nothing
             files.write_json(path, {**content(claim, inputs), "finding": made, "sha256": _digest(made)})
-    return found
+    return finding
 
 
 def cache_folder() -> Path:
@@ -76,13 +76,13 @@ def code_digest(package: Path) -> str:
 
 @cache
 def _engines() -> dict[str, str]:
-    found = {"python": platform.python_version()}
+    installed = {"python": platform.python_version()}
     for name in ENGINES:
         try:
-            found[name] = version(name)
+            installed[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            installed[name] = "not installed"
+    return installed
 
 
 def _read(path: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:

@@ -145,7 +145,7 @@ class ModelClaim(Claim):
 
     def judge_runs(self, finding: Finding, seen: Sequence[Any]) -> Finding:
         """`with_runs`, from what `judge_run` returned, with exceptions turned into the status `error`."""
-        return self.decided(lambda: self.with_runs(finding, [each for each in seen if each is not None]))
+        return self.decided(lambda: self.with_runs(finding, [result for result in seen if result is not None]))
 
 
 class TraceClaim(Claim):
@@ -195,8 +195,8 @@ class Verdict(Finding):
         cls, claim: Claim, run: str, finding: Finding, expected: str, inputs: dict[str, Any] | None = None
     ) -> Verdict:
         """The finding, with what it is about."""
-        found = {column.name: getattr(finding, column.name) for column in fields(Finding)}
-        return cls(**found, claim=claim, run=run, expected=expected, inputs=inputs or {})
+        values = {column.name: getattr(finding, column.name) for column in fields(Finding)}
+        return cls(**values, claim=claim, run=run, expected=expected, inputs=inputs or {})
 
     def __repr__(self) -> str:
         """In one line: which claim, on which run, what was found."""
@@ -275,7 +275,10 @@ def require_motion(trace: Trace) -> None:
 
 def require_measured(trace: Trace, robot: str) -> None:
     """Check the recorded drift and cover of a user's plant against the recorded positions, and where it begins."""
-    t, samples, place, body = trace.t, trace.sample_rows, trace.position(robot), trace.body(robot)
+    t = trace.t
+    samples = trace.sample_rows
+    place = trace.position(robot)
+    body = trace.body(robot)
     for name, row, end in zip(range(len(samples)), samples, [*samples[1:], len(t) - 1], strict=True):
         lasting, way = t[end] - t[row], place[end] - place[row]
         drift = np.linalg.norm(way / lasting - trace.chosen(robot)[name])
@@ -307,17 +310,21 @@ def require_body(trace: Trace, robot: str) -> None:
 
 def followed(trace: Trace, robot: str) -> Array:
     """The signals of a body that follows the recorded commands from rest, (T, k)."""
-    plant, period, t = trace.plant(robot), trace.scenario.control.period_s, trace.t
-    steered, command, samples = trace.position(robot), trace.command(robot), {*trace.sample_rows.tolist()}
+    plant = trace.plant(robot)
+    period = trace.scenario.control.period_s
+    t = trace.t
+    steered = trace.position(robot)
+    command = trace.command(robot)
+    samples = {*trace.sample_rows.tolist()}
     memory, since = plant.memory(), t[0]
-    found = [plant.at(memory, steered[0], command[0], 0.0)]
+    signals = [plant.at(memory, steered[0], command[0], 0.0)]
     for row in range(1, len(t)):
         elapsed = float(t[row] - since)
         elapsed = period if abs(elapsed - period) <= TIME_TOLERANCE_S else elapsed
-        found.append(plant.at(memory, steered[row], command[row], elapsed))
+        signals.append(plant.at(memory, steered[row], command[row], elapsed))
         if row in samples:
             memory, since = plant.remembered(memory, command[row], elapsed), t[row]
-    return np.array(found)
+    return np.array(signals)
 
 
 def _begins(trace: Trace, robot: str) -> None:

@@ -79,7 +79,7 @@ class Finding:
         quantity: what the margin is of, in a few words.
         exercised: how often the claim was put to the test, in what its `exercised_by` counts; 0: nothing could have
             refuted it; None: not counted.
-        figure: drawn beside the claim; None: there is none.
+        figure: drawn beside the claim, or None.
         from_cache: whether it was made by an earlier report, with the same inputs, code and engines, and kept.
     """
 

@@ -47,7 +47,9 @@ class Apart(NamedTuple):
 
 def apart(scenario: Scenario) -> Iterator[Apart]:
     """Who must keep apart: robot by robot each barrier, and then each two robots."""
-    safe, uav, robots = scenario.safe_distance, scenario.uav.name, scenario.robots
+    safe = scenario.safe_distance
+    uav = scenario.uav.name
+    robots = scenario.robots
     for (name, robot), (other, barrier) in product(robots.items(), scenario.barriers.items()):
         moves = barrier.expected_speed_m_s > 0.0
         required = barrier.distance_m or (moves and safe.moving_m) or safe.obstacle_m
@@ -75,8 +77,8 @@ def constants(scenario: Scenario) -> dict[str, Any]:
         "period_s": control.period_s,
         "sensing_range_m": control.sensing_range_m,
         "pairs": [
-            {"kind": each.kind, "distance_m": float(each.safe_m), "closing_m_s": float(each.closing_m_s)}
-            for each in _kinds(scenario)
+            {"kind": pair.kind, "distance_m": float(pair.safe_m), "closing_m_s": float(pair.closing_m_s)}
+            for pair in _kinds(scenario)
         ],
     }
 
@@ -84,7 +86,7 @@ def constants(scenario: Scenario) -> dict[str, Any]:
 def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
     """The pairs among a claim's inputs, as the decimals that their numbers print as."""
     return [
-        PairKind(each["kind"], decimal(each["distance_m"]), decimal(each["closing_m_s"])) for each in inputs["pairs"]
+        PairKind(pair["kind"], decimal(pair["distance_m"]), decimal(pair["closing_m_s"])) for pair in inputs["pairs"]
     ]
 
 
@@ -99,13 +101,13 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
             pairs[kind].add(own.beside(other, decimal(required) + (own.radius_m + decimal(radius))))
     for kind, both in pairs.items():
         kept: list[tuple[Fraction, Fraction]] = []
-        for each in sorted(both, reverse=True):
-            if not kept or each[1] > kept[-1][1]:
-                kept.append(each)
+        for pair in sorted(both, reverse=True):
+            if not kept or pair[1] > kept[-1][1]:
+                kept.append(pair)
         if both:
-            nearest = min(both, key=lambda each: (each[0], -each[1]))
+            nearest = min(both, key=lambda pair: (pair[0], -pair[1]))
             kept += [nearest] if nearest not in kept else []
-        yield from (PairKind(kind, *each) for each in kept)
+        yield from (PairKind(kind, *pair) for pair in kept)
 
 
 class _Robot(NamedTuple):

@@ -46,8 +46,8 @@ WIRINGS = (
         "robots avoid only what the UAV knows",
         "scenario/world.py",
         "make_world",
-        "for name, each in scenario.barriers.items()",
-        "for name, each in scenario.barriers.items() if each.known_to_uav",
+        "for name, body in scenario.barriers.items()",
+        "for name, body in scenario.barriers.items() if body.known_to_uav",
         tests=(*WIRING, *CROWD),
     ),
     Mutant(
@@ -74,8 +74,8 @@ BODIES = (
         "obstacles have no radius",
         "scenario/outlines.py",
         "outlines_of",
-        "found = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)",
-        "found = balls(obstacle.position_m or np.zeros(3), 0.0, gap)",
+        "rows = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)",
+        "rows = balls(obstacle.position_m or np.zeros(3), 0.0, gap)",
         tests=BODY,
     ),
     Mutant(

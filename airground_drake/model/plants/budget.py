@@ -98,7 +98,7 @@ def kept_distance(points: float, one: Bounds, other: Bounds = AT_REST, *, gain: 
 
 
 def _leg(hypotenuse: float, leg: float) -> float:
-    """The other leg of a right-angled triangle, from below; -inf if there is none."""
+    """A lower bound of the other leg of a right-angled triangle; -inf if the hypotenuse is too short."""
     if leg == 0.0:
         return hypotenuse
     if hypotenuse < leg:

@@ -54,8 +54,7 @@ class Clock(NamedTuple):
     def at(self, t: Array | Sequence[float]) -> Array:
         """Places of times on the axis; a time that is left out is in a cut, or at an end."""
         knots, places = ([start, start + self.end - self.begin] for start in (self.begin, self.place))
-        found: Array = np.interp(t, np.column_stack(knots).ravel(), np.column_stack(places).ravel())
-        return found
+        return np.asarray(np.interp(t, np.column_stack(knots).ravel(), np.column_stack(places).ravel()))
 
     def shows(self, t: Array) -> npt.NDArray[np.bool_]:
         """Whether times are shown."""
@@ -65,11 +64,11 @@ class Clock(NamedTuple):
     def numbers(self, apart: float) -> dict[float, str]:
         """Round times in the stretches by their places, so far apart at least; the middle of a stretch without one."""
         first, second = ticks_of((0.0, self.shown_s), 5)[:2]
-        step, found = second - first, dict[float, str]()
+        step, numbers = second - first, dict[float, str]()
         for begin, end in zip(self.begin.tolist(), self.end.tolist(), strict=True):
             times = step * np.arange(np.ceil(begin / step), np.floor(end / step) + 1.0)
             for t in times.tolist() or [round((begin + end) / 2.0, 1)]:
                 place = float(self.at([t])[0])
-                if not found or place - max(found) >= apart:
-                    found[place] = f"{round(t, 12):g}"
-        return found
+                if not numbers or place - max(numbers) >= apart:
+                    numbers[place] = f"{round(t, 12):g}"
+        return numbers

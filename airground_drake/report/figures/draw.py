@@ -33,7 +33,9 @@ ALIKE_M = 1e-9  # paths that differ by no more than this are identical but for r
 FARTHEST, NEAR = 5.0, 3.0
 
 # Numbers of the paper's figures, by the beginning of a scenario's name.
-_PAPER = {"case_a": ("3", "5", "4 and 6"), "case_b": ("7", "9", "8 and 10")}
+_PAPER = {
+    "case_a": ("Figure 3", "Figure 5", "Figures 4 and 6"), "case_b": ("Figure 7", "Figure 9", "Figures 8 and 10"),
+}  # fmt: skip
 _NUMBERED = ("trajectories", "distances", "timelines")
 # Marks of maps by kind.
 _MARKS = {
@@ -77,13 +79,11 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
         compared = comparison.draw(scenario, traces)
     counterpart = dict(zip(_NUMBERED, numbers, strict=False))
     return [
-        replace(
-            each, title=f"{each.title} (the paper's Figure{'s' * (' ' in counterpart[each.id])} {counterpart[each.id]})"
-        )
-        if each.id in counterpart
-        else each
-        for each in [*drawn, compared]
-        if each is not None
+        replace(figure, title=f"{figure.title} (the paper's {counterpart[figure.id]})")
+        if figure.id in counterpart
+        else figure
+        for figure in [*drawn, compared]
+        if figure is not None
     ]
 
 
@@ -98,7 +98,7 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
 
     def rank(ugv: str) -> tuple[bool, bool, bool, int]:
         near = [close_by(trace, ugv)[:1] for trace in runs.values()]
-        kept = all(not found.is_short for each in near for found in each)
+        kept = all(not least.is_short for nearest in near for least in nearest)
         arrived = all(MEASURES["arrives"](trace, ugv)[0] for trace in runs.values())
         called = any(events_of(trace, ugv, "trigger") for trace in runs.values())
         return kept, arrived, not called, first.ugvs.index(ugv)
@@ -109,17 +109,17 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
     return _Selection(runs, {_heading(group, runs, scenario): runs[group[0]] for group in groups}, team, ugvs)
 
 
-def _alike(one: Trace, other: Trace) -> bool:
+def _alike(run: Trace, other: Trace) -> bool:
     """Whether all robots take the same paths at the same times, and the same happens to the UGVs."""
-    t = np.union1d(one.t, other.t)
-    first, second = ([mark[:6] for mark in maps.marks_of(trace, trace.ugvs)] for trace in (one, other))
+    t = np.union1d(run.t, other.t)
+    first, second = ([mark[:6] for mark in maps.marks_of(trace, trace.ugvs)] for trace in (run, other))
     return (
         first == second
-        and bool(one.t[-1] == other.t[-1])
+        and bool(run.t[-1] == other.t[-1])
         and all(
-            np.abs(np.interp(t, one.t, a) - np.interp(t, other.t, b)).max() <= ALIKE_M
-            for robot in one.robots
-            for a, b in zip(one.body(robot).T, other.body(robot).T, strict=True)
+            np.abs(np.interp(t, run.t, a) - np.interp(t, other.t, b)).max() <= ALIKE_M
+            for robot in run.robots
+            for a, b in zip(run.body(robot).T, other.body(robot).T, strict=True)
         )
     )
 
@@ -146,23 +146,24 @@ def _trajectories(chosen: _Selection) -> Figure:
     barriers = barriers_of(first.scenario)
     keys = {heading: maps.key_of(trace, chosen.team, frame) for heading, trace in chosen.shown.items()}
     lines = max(len(maps.lines_of(key)) for key in keys.values())
-    has_walls = not all(each.is_round for each in barriers)
+    has_walls = not all(body.is_round for body in barriers)
     true_size = any(radius_m(first, name) > 0.0 for name in first.robots) or any(
-        each.is_round and each.radius_m[0] > 0.0 for each in barriers
+        body.is_round and body.radius_m[0] > 0.0 for body in barriers
     )
-    kinds = ["Hexagon: obstacle"] if any(each.is_round for each in barriers) or not has_walls else []
+    kinds = ["Hexagon: obstacle"] if any(body.is_round for body in barriers) or not has_walls else []
     kinds += ["Filled: walls"] if has_walls else []
     circles = "dark disc as large as it is, " if true_size else ""
     circles += "band around them: too near" if has_walls else "safe circle dashed"
     hidden = len(first.ugvs) - len(chosen.team)
     thin = f" Thin grey lines, which end in dots: {hidden} more UGVs." if hidden else ""
     frame_is = " Frame: the arena." if first.scenario.arena_m else ""
-    frame_is += " Dots: ways of obstacles, drawn where they start." if any(len(each.way_m) for each in barriers) else ""
+    frame_is += " Dots: ways of obstacles, drawn where they start." if any(len(body.way_m) for body in barriers) else ""
     drawn = {mark.kind for key in keys.values() for entry in key for mark in entry.marks}
-    marks = "".join(f", {text}" for kind, text in _MARKS.items() if kind in drawn)
-    last = f" Where more than {maps.MAX_MARKS} marks would be, only the last proposal of each UGV is drawn."
-    marks += "." + last * any(not entry.letter for key in keys.values() for entry in key)
-    marks += " Thick: the UGV follows the UAV." * ("accepted" in drawn)
+    marks = "".join(f", {text}" for kind, text in _MARKS.items() if kind in drawn) + "."
+    if any(not entry.letter for key in keys.values() for entry in key):
+        marks += f" Where more than {maps.MAX_MARKS} marks would be, only the last proposal of each UGV is drawn."
+    if "accepted" in drawn:
+        marks += " Thick: the UGV follows the UAV."
     caption = (
         f"○ start, \N{MULTIPLICATION SIGN} target{marks} "
         f"{'. '.join(kinds)} (hollow: not on the UAV's map), {circles}.{frame_is} Thin dashed line: the UAV.{thin}"
@@ -186,32 +187,33 @@ def _points(trace: Trace, robots: list[str], marks: Sequence[maps.Mark]) -> Tabl
     )
     told = [(mark.ugv, mark.t_s, maps.told([mark]), mark.at) for mark in marks[:MAX_TABLE_ROWS]]
     rows = tuple((r, f"{t:.2f}", what, *(f"{x:.3f}" for x in at)) for r, t, what, at in [*starts, *told, *ends])
-    some = f", the first {MAX_TABLE_ROWS} of {len(marks)} events" * (len(marks) > MAX_TABLE_ROWS)
+    some = f", the first {MAX_TABLE_ROWS} of {len(marks)} events" if len(marks) > MAX_TABLE_ROWS else ""
     return Table(f"Run {trace.run}: what happened where{some}", ("robot", "t, s", "what", "x, m", "y, m"), rows)
 
 
 def _distances(chosen: _Selection) -> Figure | None:
     near = {(heading, ugv): close_by(trace, ugv) for heading, trace in chosen.shown.items() for ugv in chosen.ugvs}
-    most = max((found.required_m for each in near.values() for found in each), default=None)
+    most = max((at.required_m for those in near.values() for at in those), default=None)
     if most is None:
         return None
-    near = {key: [at for at in each if at is each[0] or at.value_m < NEAR * most] for key, each in near.items()}
+    near = {key: [at for at in those if at is those[0] or at.value_m < NEAR * most] for key, those in near.items()}
     top = FARTHEST * most
     world = [*chosen.first.scenario.barriers, *chosen.first.robots]
-    met = {ugv: {at.other for (_, each), those in near.items() if each == ugv for at in those} for ugv in chosen.ugvs}
+    met = {ugv: {at.other for (_, robot), those in near.items() if robot == ugv for at in those} for ugv in chosen.ugvs}
     looks = {ugv: {other: k for k, other in enumerate(filter(met[ugv].__contains__, world))} for ugv in chosen.ugvs}
     half = (len(chosen.ugvs) + 1) // 2  # a single run takes both columns of the page
     columns = [chosen.ugvs] if len(chosen.shown) > 1 else [chosen.ugvs[:half], chosen.ugvs[half:]]
     panels = list[Panel]()
     for heading, trace, ugvs in [(*run, ugvs) for run in chosen.shown.items() for ugvs in columns if ugvs]:
         of_ugvs = {ugv: near[heading, ugv] for ugv in ugvs}
-        gaps = {f"{ugv} to {at.other}": gap_m(trace, ugv, at.other) for ugv, each in of_ugvs.items() for at in each}
-        smallest = "; ".join(f"{ugv} {_told(each[0])}" for ugv, each in of_ugvs.items() if each)
+        gaps = {f"{ugv} to {at.other}": gap_m(trace, ugv, at.other) for ugv, those in of_ugvs.items() for at in those}
+        smallest = "; ".join(f"{ugv} {_told(those[0])}" for ugv, those in of_ugvs.items() if those)
         drawing = timelines.distances(trace, of_ugvs, looks, top)
-        table, says = series(trace, "Distances, m", gaps), f"Smallest distances: {smallest}."
+        table = series(trace, "Distances, m", gaps)
+        says = f"Smallest distances: {smallest}."
         name = f"distances-{len(panels)}"
         panels.append(panel(drawing, name, f"Distances, {heading}", says, _runs(heading), table))
-    pairs = [(each[0], ugv, heading) for (heading, ugv), each in near.items() if each]
+    pairs = [(those[0], ugv, heading) for (heading, ugv), those in near.items() if those]
     at, ugv, heading = min(pairs, key=lambda pair: pair[0].margin_m)
     least = "Too close" if at.is_short else "Closest"
     least += f": {ugv} is {at} from {at.whom} at {at.t_s:.2f} s"
@@ -240,7 +242,7 @@ def _timelines(chosen: _Selection) -> Figure:
         panels.append(panel(drawing, name, f"Events over time, {heading}", says, heading, _happened(trace, rows)))
     drawn = {event["kind"] for trace in chosen.runs.values() for event in trace.events}
     marks = ", ".join(text for kind, text in _EVENTS.items() if kind in drawn)
-    more = f" At most {MAX_TEAM} UGVs are drawn, up to {hidden} more are in the trace." * (hidden > 0)
+    more = f" At most {MAX_TEAM} UGVs are drawn, up to {hidden} more are in the trace." if hidden > 0 else ""
     caption = (
         "Line: decision variable. Grey: the UAV is called. Hatched bar: the UGV follows the UAV."
         f"{marks and f' {marks}.'} // time in which nothing happens is left out.{more}"
@@ -254,7 +256,7 @@ def _happened(trace: Trace, ugvs: Sequence[str]) -> Table:
     every = [(e["t_s"], ugv, e["kind"]) for ugv in ugvs for e in events_of(trace, ugv, *timelines.MARKS)]
     every = sorted(every) or [(float(trace.t[x[ugv].argmax()]), ugv, "largest value") for ugv in ugvs]
     rows = ((f"{t:.3f}", ugv, what, f"{np.interp(t, trace.t, x[ugv]):.3f}") for t, ugv, what in every[:MAX_TABLE_ROWS])
-    some = f", the first {MAX_TABLE_ROWS} of {len(every)}" * (len(every) > MAX_TABLE_ROWS)
+    some = f", the first {MAX_TABLE_ROWS} of {len(every)}" if len(every) > MAX_TABLE_ROWS else ""
     return Table(f"Run {trace.run}: events{some}", ("t, s", "UGV", "event", "decision variable, m"), tuple(rows))
 
 
@@ -265,12 +267,12 @@ def _team(chosen: _Selection) -> Figure:
         "distance left to the required one, m": {}, "time of arrival, s": {}, "largest decision variable, m": {},
     }  # fmt: skip
     for name, trace in chosen.runs.items():
-        found = (
+        columns = (
             [min((at.margin_m for at in close_by(trace, ugv)), default=np.nan) for ugv in ugvs],
             [float(event["t_s"]) for ugv in ugvs for event in events_of(trace, ugv, "arrival")[-1:]],
             [float(trace.column(f"{ugv}.decision_variable_m").max()) for ugv in ugvs],
         )
-        for quantity, values in zip(quantities.values(), found, strict=True):
+        for quantity, values in zip(quantities.values(), columns, strict=True):
             quantity[name] = [value for value in values if np.isfinite(value)]
     panels = []
     for position, (what, of_runs) in enumerate(quantities.items()):

@@ -116,7 +116,9 @@ def task_error(item: Mapping[str, Any]) -> Chart:
 
 def speeds(item: Mapping[str, Any]) -> Chart:
     """Item 17: when the trigger is due over the reference's speed, and what the paper reports."""
-    travelled, printed, ours = item["evidence"]["reference_travelled_at_the_trigger_m"], item["paper"], item["ours"]
+    travelled = item["evidence"]["reference_travelled_at_the_trigger_m"]
+    printed = item["paper"]
+    ours = item["ours"]
     speed = np.linspace(0.8 * min(ours["speed_m_s"].values()), 1.2 * printed["speed_m_s"], 100)
     reported = {f"reported, {name}": (ours["speed_m_s"][name], at) for name, at in printed["trigger_s"].items()}
     return Chart(
@@ -141,7 +143,7 @@ def one_or_two(item: Mapping[str, Any]) -> Chart:
 
 
 def _curve(value: Callable[[float], float], x: Array) -> tuple[Array, Array]:
-    return x, np.array([value(each) for each in x])
+    return x, np.array([value(point) for point in x])
 
 
 # By number of the finding. Those of 1 are drawn from runs; those of 2 and 9 are charts of claims.

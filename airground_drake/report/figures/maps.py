@@ -92,7 +92,8 @@ def _answers(trace: Trace) -> Iterator[Mark]:
 
 def _collisions(trace: Trace) -> Iterator[Mark]:
     for event in (event for ugv in trace.ugvs for event in events_of(trace, ugv, "collision")[:1]):
-        other, at = event.get("other") or event.get("obstacle"), np.array(event["position_m"][:2], dtype=np.float64)
+        other = event.get("other") or event.get("obstacle")
+        at = np.array(event["position_m"][:2], dtype=np.float64)
         with_ = f" with {other}" if other else ""
         yield Mark(event["robot"], event["t_s"], "collision", "collided", f"at {_s(event['t_s'])}", with_, at)
 
@@ -147,7 +148,8 @@ def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
 
 def lines_of(key: Sequence[Entry]) -> list[tuple[str, str]]:
     """The lines below a map: a letter at the beginning of an entry that has one, and text."""
-    return [(entry.letter * (k == 0), line) for entry in key for k, line in enumerate(wrap(entry.text, LINE_CHARS))]
+    texts = ((entry.letter, wrap(entry.text, LINE_CHARS)) for entry in key)
+    return [("" if k else letter, line) for letter, lines in texts for k, line in enumerate(lines)]
 
 
 def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, key: Sequence[Entry], lines: int) -> Figure:
@@ -156,7 +158,8 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, key: Sequence[Entry],
     UGVs other than `ugvs` are thin lines that end in a dot. There is room for so many lines of text below the map.
     """
     figure, axes = axes_over(frame, frame.width_in(WIDE_IN, HIGHEST_IN), WIDE_IN, _LINE_IN * lines + 0.1 * (lines > 0))
-    (of_barriers, edges), labels = draw_barriers(axes, trace.scenario), list[Label]()
+    of_barriers, edges = draw_barriers(axes, trace.scenario)
+    labels = list[Label]()
     for robot in trace.ugvs:
         if robot not in ugvs:
             axes.plot(*trace.body(robot)[:, :2].T, color=MUTED, linewidth=0.7, zorder=1)

@@ -55,18 +55,19 @@ def distances(
 ) -> Figure:
     """Distances between the surfaces of each UGV and bodies near it, the required ones, and the exact minimum."""
     figure, every = _time_axes(1.45, [0.24, *[0.32] * (len(near) - 1)], trace)
-    required = sorted({found.required_m for each in near.values() for found in each})
+    required = sorted({at.required_m for those in near.values() for at in those})
     for axes, (ugv, those) in zip(every, near.items(), strict=True):
-        bottom = min(0.0, *(found.value_m for found in those)) if those else 0.0
+        bottom = min(0.0, *(at.value_m for at in those)) if those else 0.0
         axes.axhspan(bottom, required[0], **_FORBIDDEN)
         labels = [(d, f"required {d:.3g}", INK) for d in required]
         for d in required:
             level(axes, d, "-")
         highest = required[-1]
-        for found in those:
-            gap, appearance = gap_m(trace, ugv, found.other), look(looks[ugv][found.other])
+        for at in those:
+            gap = gap_m(trace, ugv, at.other)
+            appearance = look(looks[ugv][at.other])
             time_line(axes, trace.t, gap, appearance)
-            labels.append((min(float(gap[-1]), top), short(found.other, 12), appearance.color))
+            labels.append((min(float(gap[-1]), top), short(at.other, 12), appearance.color))
             highest = max(highest, float(np.nanmax(gap)))
         axes.set_ylim(bottom, min(1.05 * highest, top))
         rule(axes, "time, s" if axes is every[-1] else "", "distance, m")
@@ -106,8 +107,8 @@ class _Label(NamedTuple):
 def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
     """Decision variables of UGVs and what happened, a row each, without the time in which nothing happened."""
     happened = {ugv: events_of(trace, ugv, *MARKS) for ugv in ugvs}
-    clock = Clock.around([event["t_s"] for each in happened.values() for event in each], *_ends_s(trace))
-    labels = {ugv: _labels(each, clock) for ugv, each in happened.items()}
+    clock = Clock.around([event["t_s"] for those in happened.values() for event in those], *_ends_s(trace))
+    labels = {ugv: _labels(those, clock) for ugv, those in happened.items()}
     heads = [short(ugv) if labels[ugv] else fill(f"{short(ugv)}: {told(trace, ugv)}", TOLD_CHARS) for ugv in ugvs]
     lines = [max((label.top for label in labels[ugv]), default=0) for ugv in ugvs]
     above_in = [_LINE_IN * (line + head.count("\n") + 1) + 0.14 for line, head in zip(lines, heads, strict=True)]
@@ -122,7 +123,9 @@ def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
             axes.plot([label.at] * 2, [0.0, y], transform=across, color=color, linewidth=0.6, clip_on=False)
             axes.text(label.begin, y, label.text, color=color, transform=across, va="bottom", fontsize=8, bbox=BOX)
         for event in happened[ugv]:
-            kind, t_s, (low, high) = event["kind"], event["t_s"], axes.get_ylim()
+            kind = event["kind"]
+            t_s = event["t_s"]
+            low, high = axes.get_ylim()
             share = {"trigger": None, "release": None, "proposal": 0.36}.get(kind, 0.09)
             x = np.interp(t_s, trace.t, trace.column(f"{ugv}.decision_variable_m"))
             axes.plot(
@@ -148,7 +151,8 @@ def _left_out(trace: Trace, clock: Clock) -> str:
 
 def _behind(axes: Axes, trace: Trace, ugv: str, clock: Clock) -> None:
     """What is behind the events of a UGV: its decision variable, both levels, calls of the UAV, and cuts."""
-    t, zeta = np.union1d(trace.t[clock.shows(trace.t)], [clock.begin, clock.end]), float(trace.meta["zeta_m"])
+    t = np.union1d(trace.t[clock.shows(trace.t)], [clock.begin, clock.end])
+    zeta = float(trace.meta["zeta_m"])
     x = np.interp(t, trace.t, trace.column(f"{ugv}.decision_variable_m"))
     bottom, top = min(0.0, *x), max(zeta, *x)
     axes.set_ylim(bottom, top + 0.15 * (top - bottom))
@@ -186,7 +190,7 @@ def _labels(happened: Sequence[Mapping[str, Any]], clock: Clock) -> list[_Label]
         width = s_per_in * _CHAR_IN * max(map(len, text.split("\n")))
         at = float(clock.at([group[0]["t_s"]])[0])
         begin = max(min(at, clock.length + s_per_in * _RIGHT_IN - width), -s_per_in * _LEFT_IN)
-        over = [one.top for one in labels if one.begin < begin + width and begin < one.end]
+        over = [label.top for label in labels if label.begin < begin + width and begin < label.end]
         color = next((_COLORS[event["kind"]] for event in group if event["kind"] in ("refuse", "accept")), INK)
         labels.append(_Label(at, begin, begin + width, max(over, default=0), text, color))
     return labels
@@ -198,14 +202,18 @@ def _word(kind: str, t_s: float) -> str:
 
 def told(trace: Trace, ugv: str) -> str:
     """The events of a UGV with their times; many events are counted by kind; without any, its largest value."""
-    found = events_of(trace, ugv, *MARKS)
-    if not found:
+    marks = events_of(trace, ugv, *MARKS)
+    if not marks:
         x = trace.column(f"{ugv}.decision_variable_m")
         return f"nothing happens; largest {x.max():.3g} m at {trace.t[x.argmax()]:.2f} s"
-    if len(found) <= MAX_TOLD:
-        return f"{', '.join(_word(event['kind'], event['t_s']) for event in found)} s"
-    times = {kind: [event["t_s"] for event in found if event["kind"] == kind] for kind in MARKS}
-    counts = (f"{len(t)} \N{MULTIPLICATION SIGN} " * (len(t) > 1) + _word(kind, t[0]) for kind, t in times.items() if t)
+    if len(marks) <= MAX_TOLD:
+        return f"{', '.join(_word(event['kind'], event['t_s']) for event in marks)} s"
+    times = {kind: [event["t_s"] for event in marks if event["kind"] == kind] for kind in MARKS}
+    counts = [
+        _word(kind, t[0]) if len(t) == 1 else f"{len(t)} \N{MULTIPLICATION SIGN} {_word(kind, t[0])}"
+        for kind, t in times.items()
+        if t
+    ]
     return f"{', '.join(counts)} s (first times)"
 
 
@@ -271,7 +279,9 @@ def _ends_s(trace: Trace) -> tuple[float, float]:
 def _time_axes(inner_in: float, above_in: Sequence[float], trace: Trace) -> tuple[Figure, list[Axes]]:
     """Axes over time, stacked, of the same height, with room above each, and on the right for labels."""
     height_in = 0.42 + sum(above_in) + inner_in * len(above_in)
-    figure, every, top_in = Figure(figsize=(WIDE_IN, height_in)), [], height_in
+    figure = Figure(figsize=(WIDE_IN, height_in))
+    every = []
+    top_in = height_in
     for room_in in above_in:
         top_in -= room_in + inner_in
         size = (WIDE_IN - _LEFT_IN - _RIGHT_IN) / WIDE_IN, inner_in / height_in

@@ -199,7 +199,9 @@ def _text(of: ElementTree.Element, key: str) -> str:
 
 def _parsed(text: str, source: str) -> ElementTree.Element:
     """The elements of an XML text; each has its line as an attribute. A DTD, which may hold bombs, is refused."""
-    builder, parser, count = ElementTree.TreeBuilder(), expat.ParserCreate(), 0
+    builder = ElementTree.TreeBuilder()
+    parser = expat.ParserCreate()
+    count = 0
 
     def refuse(fault: str, allowed: str) -> ScenarioError:
         return ScenarioError(f"{source}:{parser.CurrentLineNumber}", "", Fault(fault), allowed)

@@ -39,7 +39,8 @@ def cells(text: str, source: str) -> Cells:
         fault = Fault(f"{height} x {width} cells")
         raise ScenarioError(f"{source}:2", "height", fault, f"at most {MOST_CELLS} are allowed")
     if len(rows) < height or any(map(str.strip, rows[height:])):
-        where, fault = f"{source}:{min(len(rows), height) + len(HEADER)}", Fault(f"{len(rows)} rows")
+        where = f"{source}:{min(len(rows), height) + len(HEADER)}"
+        fault = Fault(f"{len(rows)} rows")
         raise ScenarioError(where, "map", fault, f"as many as height = {height} are wanted")
     rows = [row.rstrip() for row in rows[:height]]
     for number, row in enumerate(rows, len(HEADER) + 1):
@@ -59,7 +60,8 @@ def agents(text: str, source: str, in_the_way: Cells) -> list[Agent]:
         raise ScenarioError(f"{source}:1", "version", Fault("missing"), "wanted: a scenario of MovingAI")
     placed = []
     for number, line in enumerate(lines, 2):
-        where, parts = f"{source}:{number}", line.split("\t") if "\t" in line else line.split()
+        where = f"{source}:{number}"
+        parts = line.split("\t") if "\t" in line else line.split()
         if not line.strip():
             continue
         if len(parts) != 9:

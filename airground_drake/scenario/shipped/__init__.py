@@ -21,8 +21,8 @@ def shipped() -> list[str]:
 
 def shipped_files() -> dict[str, Traversable]:
     """The files of the scenarios that come with the package, by name."""
-    found = resources.files(__package__).iterdir()
-    return {file.name.removesuffix(".yaml"): file for file in found if file.name.endswith(".yaml")}
+    entries = resources.files(__package__).iterdir()
+    return {file.name.removesuffix(".yaml"): file for file in entries if file.name.endswith(".yaml")}
 
 
 def argument(path: Path) -> str:

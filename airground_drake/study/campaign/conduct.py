@@ -79,10 +79,10 @@ def conduct(
         table = table[table["index"] <= stopped]
     runs = per_run(table)
     of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept if key in runs]
-    found: dict[str, Any] = files.strict(evidence(table, spec.marks, spec.dependent)) | of
-    files.write_json(folder / EVIDENCE, found)
-    files.write_text(folder / PAGE, page(found, table))
-    return found
+    result: dict[str, Any] = files.strict(evidence(table, spec.marks, spec.dependent)) | of
+    files.write_json(folder / EVIDENCE, result)
+    files.write_text(folder / PAGE, page(result, table))
+    return result
 
 
 def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:

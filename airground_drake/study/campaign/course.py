@@ -39,7 +39,7 @@ def _range(least: int, most: int) -> Callable[[object], tuple[int, int]]:
 def _sizes(value: object) -> tuple[float, float]:
     """Read a range [least, most] of sizes, m."""
     given = value if isinstance(value, list | tuple) else ()
-    if len(given) != 2 or any(type(each) not in (int, float) for each in given):
+    if len(given) != 2 or any(type(size) not in (int, float) for size in given):
         raise refused(value, "wanted: [least, most] in m")
     low, high = map(float, given)
     if not LEAST_M <= low <= high <= MOST_M:
@@ -132,7 +132,7 @@ class Course:
         for x in side:
             for _ in range(TRIES):
                 place = np.array([x, rng.uniform(-0.5, 0.5) * self.width_m])
-                if all(np.linalg.norm(place - each) >= least for each in places):
+                if all(np.linalg.norm(place - taken) >= least for taken in places):
                     places.append(place)
                     break
             else:
@@ -156,13 +156,14 @@ class Course:
         self, rng: np.random.Generator, kind: str, count: int, ends: Array, least: Array
     ) -> dict[str, dict[str, Any]]:
         """Draw walls or boxes, by name, at least the distances (k,), m, away from the ends (k, 2), m."""
-        found: dict[str, dict[str, Any]] = {}
+        shapes: dict[str, dict[str, Any]] = {}
         for _ in range(TRIES):
-            if len(found) == count:
+            if len(shapes) == count:
                 break
             place = rng.uniform([0.0, -0.5 * self.width_m], [self.length_m, 0.5 * self.width_m])
             length, width = np.round(rng.uniform(*self.size_m, 2), 6).tolist()
-            heading, hidden = round(rng.uniform(-np.pi, np.pi), 6), rng.random() < self.hidden
+            heading = round(rng.uniform(-np.pi, np.pi), 6)
+            hidden = rng.random() < self.hidden
             shape = Obstacle(_ground(place), known_to_uav=not hidden, heading_rad=heading)
             if kind == "wall":
                 shape.segment_m = [[-length / 2.0, 0.0], [length / 2.0, 0.0]]
@@ -171,10 +172,10 @@ class Course:
             rows = outline.stacked(outline.prism(part) for part in convex_parts(shape) or ())
             apart = [convex.distances(rows, np.append(end, 0.0), True)[0] for end in ends]
             if (np.array(apart) >= least).all():
-                found[f"{kind}{len(found) + 1}"] = asdict(shape)
-        if len(found) < count:
+                shapes[f"{kind}{len(shapes) + 1}"] = asdict(shape)
+        if len(shapes) < count:
             raise ValueError(f"{count} of kind {kind} have no room between starts and targets")
-        return found
+        return shapes
 
 
 def _ground(place: Sequence[float] | Array) -> list[float]:

@@ -91,15 +91,15 @@ def drawn_keys(first: pd.DataFrame) -> pd.DataFrame:
     """The drawn values by index and key: numbers as they are, an entry of a list as key.0, other values as text."""
 
     def entries(key: str, value: Any) -> Json:
-        if isinstance(value, list) and all(isinstance(each, int | float) for each in value):
-            return {f"{key}.{i}": each for i, each in enumerate(value)}
+        if isinstance(value, list) and all(isinstance(item, int | float) for item in value):
+            return {f"{key}.{i}": item for i, item in enumerate(value)}
         return {key: value if type(value) in (int, float) else json.dumps(value)}
 
-    found = {}
+    by_index = {}
     for index, text in zip(first["index"], first["drawn"], strict=True):
         pairs = (entries(key, value).items() for key, value in json.loads(text).items())
-        found[index] = dict(chain.from_iterable(pairs))
-    return pd.DataFrame.from_dict(found, orient="index")
+        by_index[index] = dict(chain.from_iterable(pairs))
+    return pd.DataFrame.from_dict(by_index, orient="index")
 
 
 def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded: bool) -> Json:
@@ -127,14 +127,14 @@ def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded:
 
 def _times(run: str, rows: pd.DataFrame, marks: Mapping[str, float]) -> Json:
     sums = {name: int(rows[name].sum()) for name in ("arrived", "ugvs")}
-    found: Json = {"run": run, "runs": len(rows), **sums}
+    times: Json = {"run": run, "runs": len(rows), **sums}
     for name in TIMES:
         values = rows[name].dropna().to_numpy()
-        found[name] = {"count": len(values), "quantiles": _quantiles(values)}
+        times[name] = {"count": len(values), "quantiles": _quantiles(values)}
         if name in marks and len(values):
-            found[name]["mark"] = marks[name]
-            found[name]["share_below_mark"] = float((values < marks[name]).mean())
-    return found
+            times[name]["mark"] = marks[name]
+            times[name]["share_below_mark"] = float((values < marks[name]).mean())
+    return times
 
 
 def _quantiles(values: Array) -> dict[str, float]:
@@ -174,8 +174,8 @@ def _parts(values: pd.Series) -> pd.Series | None:
     if not is_numeric_dtype(values) and values.nunique() > MOST_VALUES:
         return None
     if not is_numeric_dtype(values) or values.nunique() <= BINS:
-        found = values.astype(str)
+        texts = values.astype(str)
     else:
         quarters = pd.qcut(values, BINS, duplicates="drop")
-        found = quarters.map(lambda part: f"{part.left:.4g} to {part.right:.4g}").astype(str)
-    return found.reset_index(drop=True) if len(found.unique()) > 1 else None
+        texts = quarters.map(lambda part: f"{part.left:.4g} to {part.right:.4g}").astype(str)
+    return texts.reset_index(drop=True) if len(texts.unique()) > 1 else None

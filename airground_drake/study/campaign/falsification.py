@@ -71,17 +71,17 @@ def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress:
         asked = _asked(sampler, dimensions(search.spec.drawn))
         points = asked[: number - best.tried]
         values = np.full(len(points), np.inf)
-        found = np.zeros(len(points), dtype=bool)
+        refuted = np.zeros(len(points), dtype=bool)
         for k, judged in pool(partial(search.at, points), range(len(points))):
             if judged is not None:
-                values[k], found[k] = judged
+                values[k], refuted[k] = judged
         if len(points) == len(asked):
             with _guarded(sampler, "tell"):
                 sampler.tell(points.copy(), values.copy())
-        k = int(np.argmin(np.where(found, values, np.inf))) if found.any() else int(values.argmin())
+        k = int(np.argmin(np.where(refuted, values, np.inf))) if refuted.any() else int(values.argmin())
         tried = best.tried + len(points)
-        if found.any() or values[k] < best.value:
-            best = Best(tried, float(values[k]), points[k], bool(found[k]))
+        if refuted.any() or values[k] < best.value:
+            best = Best(tried, float(values[k]), points[k], bool(refuted[k]))
         else:
             best = replace(best, tried=tried)
         progress.advance(len(points), f"least {best.value:.6g}")

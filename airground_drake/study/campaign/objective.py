@@ -41,7 +41,7 @@ class Most:
     def value(self, rows: Sequence[Row]) -> float:
         """The negated largest value in the rows of a draw; infinite without a measurement."""
         values = [-self._of(row) for row in rows if row["ended"] == JUDGED]
-        return min((each for each in values if not math.isnan(each)), default=math.inf)
+        return min((value for value in values if not math.isnan(value)), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
         """Whether the limit is exceeded."""

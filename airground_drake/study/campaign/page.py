@@ -33,25 +33,26 @@ class Drawing(NamedTuple):
     svg: Markup
 
 
-def page(found: dict[str, Any], table: pd.DataFrame) -> str:
+def page(result: dict[str, Any], table: pd.DataFrame) -> str:
     """Render the page."""
     template = _environment().get_template("campaign.html.j2")
     return template.render(
-        found=found, told=told(found), engines=made_by(found["engines"]), separated=_separated(found),
-        figures=_figures(found, table),
+        found=result, told=told(result), engines=made_by(result["engines"]), separated=_separated(result),
+        figures=_figures(result, table),
         sweeps=[
-            (each["key"], each["entries"], swept.drawing(each["entries"], each["key"], f"swept{k}"))
-            for k, each in enumerate(found.get("swept", ())) if each["entries"]
+            (sweep["key"], sweep["entries"], swept.drawing(sweep["entries"], sweep["key"], f"swept{k}"))
+            for k, sweep in enumerate(result.get("swept", ())) if sweep["entries"]
         ],
     )  # fmt: skip
 
 
-def told(found: Mapping[str, Any]) -> list[Line]:
+def told(result: Mapping[str, Any]) -> list[Line]:
     """A sentence for each claim, with its bound: violations first, then open claims."""
     lines = []
-    for claim in found["claims"]:
+    for claim in result["claims"]:
         what = f"{claim['claim']} in run {claim['run']}"
-        bounds, confidence = claim["anytime"], f"confidence {found.get('confidence', 0.0):g}"
+        bounds = claim["anytime"]
+        confidence = f"confidence {result.get('confidence', 0.0):g}"
         if claim["untested"]:
             lines.append(Line("open", f"{what}: the scenario expects a test, but no run tested it."))
         elif claim["refuted"]:
@@ -90,10 +91,10 @@ class Separation(NamedTuple):
     drawing: Drawing
 
 
-def _separated(found: Mapping[str, Any]) -> list[Separation]:
+def _separated(result: Mapping[str, Any]) -> list[Separation]:
     """One for each claim with violations that depend on a drawn key."""
     separations = list[Separation]()
-    for claim in found["claims"]:
+    for claim in result["claims"]:
         if where := claim["fails_where"]:
             cells = sorted(where["cells"], key=lambda cell: cell["refuted"] / cell["runs"])
             most, least = (f"in {c['refuted']} of {c['runs']} runs with {_cell(c)}" for c in (cells[-1], cells[0]))
@@ -125,7 +126,7 @@ def _shares(cells: Sequence[Mapping[str, Any]]) -> str:
         return canvas.svg(figure)
 
 
-def _figures(found: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
+def _figures(result: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
     judged = table[table["ended"] == JUDGED]
     drawn = []
     for (run, claim), rows in judged[judged["claim"].isin(SHOWN)].groupby(["run", "claim"]):
@@ -135,7 +136,7 @@ def _figures(found: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
                 _histogram(values, f"{claim} in run {run}: margin", "margin, " + str(rows["unit"].iloc[0]), 0.0)
             )
     runs = judged.drop_duplicates(["index", "run"])
-    marks = {each["run"]: each["first_trigger_s"].get("mark") for each in found["times"]}
+    marks = {times["run"]: times["first_trigger_s"].get("mark") for times in result["times"]}
     for run, rows in runs.groupby("run"):
         values = rows["first_trigger_s"].dropna().to_numpy()
         if len(values):

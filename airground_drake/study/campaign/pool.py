@@ -64,8 +64,8 @@ def _result_of(future: Future[T], call: Callable[[], T]) -> T | None:
     with suppress(BrokenProcessPool):
         return future.result()
     for _ in range(DEATHS):
-        with suppress(BrokenProcessPool), processes(1) as one:
-            return one.submit(call).result()
+        with suppress(BrokenProcessPool), processes(1) as executor:
+            return executor.submit(call).result()
     return None
 
 

@@ -56,7 +56,9 @@ class CmaEs:
 
     def __init__(self, dimensions: int, seed: int) -> None:
         """For points (n,)."""
-        self._dimensions, self._rng, self.restarts = dimensions, np.random.default_rng(seed), -1
+        self._dimensions = dimensions
+        self._rng = np.random.default_rng(seed)
+        self.restarts = -1
         self._begin()
 
     def ask(self) -> Array:

@@ -42,8 +42,8 @@ def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
     while changed:
         changed = False
         for smaller in steps:
-            while (found := first(smaller(data))) is not None:
-                data, changed = found, True
+            while (shrunk := first(smaller(data))) is not None:
+                data, changed = shrunk, True
     return data, tests - left
 
 
@@ -98,7 +98,7 @@ def _rounder(data: Json) -> Iterator[Json]:
 
 def _round(value: Any, digits: int) -> Any:
     if isinstance(value, dict):
-        return {key: _round(each, digits) for key, each in value.items()}
+        return {key: _round(item, digits) for key, item in value.items()}
     if isinstance(value, list):
-        return [_round(each, digits) for each in value]
+        return [_round(item, digits) for item in value]
     return round(value, digits) + 0.0 if isinstance(value, float) else value

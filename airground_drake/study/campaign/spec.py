@@ -147,7 +147,8 @@ class Spec(File):
         overrides = dict(self.fixed)
         if self.course is not None:
             base = self._fixed_part
-            distance, rng = base.safe_distance, stream(self.seed, COURSE, index)
+            distance = base.safe_distance
+            rng = stream(self.seed, COURSE, index)
             try:
                 overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m, base.uav.altitude_m)
             except ValueError as error:
@@ -196,9 +197,9 @@ def load_spec(path: Path) -> Spec:
     document, content = read(path)
     if isinstance(document.data, dict):
         document.data.setdefault("name", path.stem)
-    found: File = filled(File, document)
-    scenario = found.scenario if found.scenario in shipped() else str(path.parent / found.scenario)
-    given = vars(found) | {"scenario": scenario}
+    file: File = filled(File, document)
+    scenario = file.scenario if file.scenario in shipped() else str(path.parent / file.scenario)
+    given = vars(file) | {"scenario": scenario}
     spec = Spec(**given, digest=files.sha256(content), source=str(path), data=_judged_part(scenario))
     _check_overrides(spec, document)
     _check_names(spec, document)
@@ -208,7 +209,7 @@ def load_spec(path: Path) -> Spec:
 def _check_overrides(spec: Spec, document: Document) -> None:
     """Refuse values under `set` that are not valid or that a course replaces, and unknown keys under `draw`."""
     for key in spec.fixed if spec.course is not None else ():
-        if f"{key}.".startswith(tuple(f"{each}." for each in REPLACES)):
+        if f"{key}.".startswith(tuple(f"{key_of}." for key_of in REPLACES)):
             wanted = "wanted: a key that the course does not draw; one under draw comes after the course"
             raise ScenarioError(document.where("set", key), f"set.{key}", Fault("the course would replace it"), wanted)
     try:

@@ -40,7 +40,9 @@ def confidence_sequence(k: int, n: int, confidence: float = CONFIDENCE) -> Inter
     # at most. It is convex in the log-odds, least at k/n.
     if n == 0:
         return Interval(0.0, 1.0)
-    wealth, most, at = betaln(k + 1, n - k + 1), -math.log(1.0 - confidence), k / n
+    wealth = betaln(k + 1, n - k + 1)
+    most = -math.log(1.0 - confidence)
+    at = k / n
 
     def excess(p: float) -> float:
         taken = (k * math.log(p) if k else 0.0) + ((n - k) * math.log1p(-p) if n > k else 0.0)

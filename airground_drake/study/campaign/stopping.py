@@ -32,16 +32,16 @@ class Stopping:
     def parse(cls, text: str, claims: Collection[str] = ()) -> Stopping:
         """Parse a rule."""
         # claims: identifiers of the claims that are judged; empty: all about runs.
-        found = _RULE.fullmatch(text)
+        match = _RULE.fullmatch(text)
         try:
-            value = float(found["value"]) if found else 0.0
+            value = float(match["value"]) if match else 0.0
         except ValueError:
             value = 0.0
-        if found is None or not 0.0 < value < 1.0:
+        if match is None or not 0.0 < value < 1.0:
             raise ValueError(f"{text!r} is not allowed; wanted: CLAIM < PROBABILITY or CLAIM > PROBABILITY")
-        if found["claim"] not in (judged := claims or tuple(RUN_CLAIMS)):
-            raise UnknownNameError("claim that is judged", found["claim"], judged)
-        return cls(found["claim"], found["sign"] == "<", value)
+        if match["claim"] not in (judged := claims or tuple(RUN_CLAIMS)):
+            raise UnknownNameError("claim that is judged", match["claim"], judged)
+        return cls(match["claim"], match["sign"] == "<", value)
 
     def met(self, rows: list[Row]) -> bool:
         """Count the rows of one more draw; return whether every run of the scenario now meets the rule."""

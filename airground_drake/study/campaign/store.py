@@ -132,20 +132,20 @@ def _is_nothing(path: Path) -> bool:
 
 
 def _be_the_same(folder: Path, manifest: dict[str, Any]) -> None:
-    found = _manifest(folder)
-    if found is None:
+    recorded = _manifest(folder)
+    if recorded is None:
         raise FolderError(one_line(f"{folder} has no campaign to resume: no {MANIFEST} of ours"))
-    other = sorted(key for key in {*found, *manifest} if found.get(key) != manifest.get(key))
+    other = sorted(key for key in {*recorded, *manifest} if recorded.get(key) != manifest.get(key))
     if other:
         raise FolderError(one_line(f"{folder} has another campaign ({', '.join(other)}); allowed: the same"))
 
 
 def _manifest(folder: Path) -> dict[str, Any] | None:
     try:
-        found = json.loads(files.read_text(folder / MANIFEST))
+        manifest = json.loads(files.read_text(folder / MANIFEST))
     except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) and found.get("schema") == SCHEMA else None
+    return manifest if isinstance(manifest, dict) and manifest.get("schema") == SCHEMA else None
 
 
 def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
@@ -183,7 +183,7 @@ def _content(path: Path) -> bytes:
 
 def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tuple[dict[int, list[Row]], int]:
     """Rows by index, except known draws, and the number of bytes up to the last whole line."""
-    found: dict[int, list[Row]] = {}
+    draws: dict[int, list[Row]] = {}
     whole = 0
     for line in _content(path).splitlines(keepends=True) if os.path.lexists(path) else ():
         if not line.endswith(b"\n"):
@@ -196,8 +196,8 @@ def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tupl
             cut = line.decode(errors="replace")[:80]
             raise FolderError(one_line(f"{path} has a line that is no draw: {cut}")) from None
         if index not in known:
-            found[index] = rows
-    return found, whole
+            draws[index] = rows
+    return draws, whole
 
 
 def _sealed(manifest: dict[str, Any], rows: Sequence[Row]) -> list[Row]:

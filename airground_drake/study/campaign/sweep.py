@@ -59,13 +59,14 @@ def sweep(
             if name not in allowed:
                 raise UnknownNameError(kind, name, allowed)
     _require_keys(spec)
-    work, indices = partial(rows_of, spec, limits=DEFAULT_LIMITS._replace(plugins=True)), range(spec.combinations)
+    work = partial(rows_of, spec, limits=DEFAULT_LIMITS._replace(plugins=True))
+    indices = range(spec.combinations)
     if jobs == 1:
-        found = {index: work(index) for index in indices}
+        draws = {index: work(index) for index in indices}
     else:
         with pool.local(jobs) as processes:
-            found = {index: died(index) if rows is None else rows for index, rows in processes(work, indices)}
-    return per_run(table_of(list(chain.from_iterable(found[index] for index in indices))))
+            draws = {index: died(index) if rows is None else rows for index, rows in processes(work, indices)}
+    return per_run(table_of(list(chain.from_iterable(draws[index] for index in indices))))
 
 
 def _require_keys(spec: Spec) -> None:

@@ -46,13 +46,13 @@ def per_run(table: pd.DataFrame) -> pd.DataFrame:
     verdicts = pd.Series(said, judged.index, dtype=object).unstack()  # noqa: PD010 - `pivot_table` leaves out
     margins = judged["margin"].unstack().add_suffix(MARGIN)  # noqa: PD010 - claims without margins
     claims = [name for claim in verdicts for name in (claim, f"{claim}{MARGIN}")]
-    found = pd.concat([keys, runs[list(OF_A_RUN)], verdicts, margins], axis=1).reindex(runs.index).reset_index()
-    return found[["index", *keys.columns, "run", *OF_A_RUN, *claims]]
+    joined = pd.concat([keys, runs[list(OF_A_RUN)], verdicts, margins], axis=1).reindex(runs.index).reset_index()
+    return joined[["index", *keys.columns, "run", *OF_A_RUN, *claims]]
 
 
 def _plain(text: str) -> Json:
     values = json.loads(text)
-    return {key: each if type(each) in (int, float) else json.dumps(each) for key, each in values.items()}
+    return {key: value if type(value) in (int, float) else json.dumps(value) for key, value in values.items()}
 
 
 def by_value(runs: pd.DataFrame, key: str) -> list[Json]:
@@ -68,24 +68,24 @@ def by_value(runs: pd.DataFrame, key: str) -> list[Json]:
         claim, how many runs tested it, refuted it and left it undecided, and the least margin, or None.
     """
     claims = [str(name).removesuffix(MARGIN) for name in runs if str(name).endswith(MARGIN)]
-    found = []
+    entries = []
     for (value, run), rows in runs.groupby([key, "run"], sort=True, dropna=False):
         judged = rows[rows["ended"] == JUDGED]
         all_there = judged[judged["arrived"] == judged["ugvs"]]
-        found.append({
+        entries.append({
             "value": value.item() if isinstance(value, np.generic) else value, "run": str(run), "runs": len(rows),
             "judged": len(judged), "arrived": int(judged["arrived"].sum()), "ugvs": int(judged["ugvs"].sum()),
             "first_trigger_s": _number(judged["first_trigger_s"].median()),
             "arrival_s": _number(all_there["arrival_s"].median()),
             "claims": {claim: _counted(judged[claim], judged[f"{claim}{MARGIN}"]) for claim in claims},
         })  # fmt: skip
-    return found
+    return entries
 
 
 def _counted(verdicts: pd.Series, margins: pd.Series) -> Json:
     tested = verdicts.notna() & (verdicts != NOT_EXERCISED)
     counts = {"tested": tested, "refuted": verdicts == "refuted", "undecided": tested & verdicts.isin(UNDECIDED)}
-    return {name: int(each.sum()) for name, each in counts.items()} | {"margin": _number(margins[tested].min())}
+    return {name: int(mask.sum()) for name, mask in counts.items()} | {"margin": _number(margins[tested].min())}
 
 
 def _number(value: float) -> float | None:
@@ -99,10 +99,10 @@ def drawing(entries: Sequence[Json], key: str, name: str) -> Markup:
     numbers = all(isinstance(value, int | float) for value in values)
     places = {value: float(value) if numbers else float(k) for k, value in enumerate(values)}
     claims = entries[0]["claims"]
-    claim = next((each for each in DRAWN if each in claims), next(iter(claims), None))
+    claim = next((name for name in DRAWN if name in claims), next(iter(claims), None))
     panels = [
         *([(f"least margin of {claim}", [entry["claims"][claim]["margin"] for entry in entries])] if claim else []),
-        (SHARE, [each["arrived"] / each["ugvs"] if each["ugvs"] else None for each in entries]),
+        (SHARE, [entry["arrived"] / entry["ugvs"] if entry["ugvs"] else None for entry in entries]),
         ("median time of the last arrival, s", [entry["arrival_s"] for entry in entries]),
     ]  # fmt: skip
     with canvas.style():

@@ -145,8 +145,8 @@ def _compared(trace: Trace, by_drake: Trace) -> str:
     both = trace.meta["faults"] + by_drake.meta["faults"]
     if any(OutOfTime.__name__ in fault["what"] for fault in both):
         return CLOCK  # a policy's limit is in time by the clock, and need not fall at the same plan
-    if (found := first_difference(by_drake, trace)) is not None:
-        about, drakes, ours = found
+    if (difference := first_difference(by_drake, trace)) is not None:
+        about, drakes, ours = difference
         told = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"
         raise EnginesDifferError(
             one_line(f"{told} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")

@@ -10,7 +10,7 @@ class Rewards:
 
     The reward of a UGV for a step is minus the time, s, for which it was away from its target since the request before.
     At the end of the run a UGV that is still away also loses the time, s, that the straight way left would take at the
-    speed of its preset. Safety is no part of it: `judge` says what is proved.
+    speed of its preset. Rewards ignore safety: `judge` says what is proved.
     """
 
     def __init__(self, episode: Episode) -> None:

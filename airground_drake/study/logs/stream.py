@@ -21,7 +21,7 @@ LAST = np.iinfo(np.int64).max
 
 
 def unit_since_1970(least: float, largest: float) -> str:
-    """The unit in which numbers are stamps since 1970, from 2000 to 2100; '' if there is none."""
+    """The unit in which numbers, as times since 1970, are in the years 2000 to 2100; '' if no unit fits."""
     return next((unit for unit, per in PER_S.items() if YEAR_2000_S <= least / per <= largest / per <= YEAR_2100_S), "")
 
 

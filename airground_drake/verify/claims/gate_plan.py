@@ -166,7 +166,7 @@ class GatePlan(GateClaim):
             plans_with_slack=sum(value > 0.0 for value in slack),
             rounded_plans=len(rounded),
             largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
-            largest_gaps=[{"t_s": each.row.t_s, "robot": each.row.robot, "gap": each.gap} for each in bounded[:5]],
+            largest_gaps=[{"t_s": row.row.t_s, "robot": row.row.robot, "gap": row.gap} for row in bounded[:5]],
             median_gap=float(np.median([decision.gap for decision in bounded])) if bounded else None,
             widest_enclosure=widest,
             first_stage_certified=sum(decision.first_stage_certified for decision in bounded),
@@ -280,7 +280,8 @@ def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
         longer = given[f"{chosen}_left_m"] / max(given[f"{other}_left_m"], LEAST_COST) - 1.0
         yield Deviation(row, f"{chosen} stops farther from the goal than {other}", max(0.0, longer), LONGER)
     for choice in (chosen, other):
-        cost, ahead = given[f"{choice}_outcome_m2_s"], given[f"{choice}_left_m"] ** 3 / (3.0 * max(speed, 1e-9))
+        cost = given[f"{choice}_outcome_m2_s"]
+        ahead = given[f"{choice}_left_m"] ** 3 / (3.0 * max(speed, 1e-9))
         off = cost - ahead if given[f"{choice}_stalls"] == 1.0 else min(0.0, cost - ahead)
         yield Deviation(row, f"cost of the way left, {choice}", off, cost_tolerance(ahead), recomputed=ahead)
 

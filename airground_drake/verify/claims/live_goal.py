@@ -82,7 +82,9 @@ class Condition(NamedTuple):
 
 def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator[Condition]:
     """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
-    scenario, uav, arrival = trace.scenario, trace.scenario.uav, float(trace.scenario.arrival_tolerance_m)
+    scenario = trace.scenario
+    uav = trace.scenario.uav
+    arrival = float(trace.scenario.arrival_tolerance_m)
     for ugv in trace.ugvs:
         target = scenario.ugvs[ugv].target_m
         if ugv not in stalls:

@@ -60,11 +60,13 @@ class LiveHyp(GateClaim):
 
     def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Go through all acceptances; the margin is what is left of the time that LIVE-WAIT allows."""
-        gate, found = trace.scenario.gatekeeper, acceptances(trace)
+        gate, accepted = trace.scenario.gatekeeper, acceptances(trace)
         allowed_s = gate.tries * (gate.longest_s + gate.period_s)
-        most, longest_s, where = 0, 0.0, dict[str, Any]()
-        wrong = [fault for of_ugv in found.values() for fault in _wrong(trace, of_ugv)]
-        for ugv, of_ugv in found.items():
+        most = 0
+        longest_s = 0.0
+        where = dict[str, Any]()
+        wrong = [fault for of_ugv in accepted.values() for fault in _wrong(trace, of_ugv)]
+        for ugv, of_ugv in accepted.items():
             begins = _after_rests(of_ugv, gate.rest_s)
             tries = np.diff(np.searchsorted([acceptance.t_s for acceptance in of_ugv], [*begins, np.inf]))
             executed_s = _executed_s(trace, ugv, begins)
@@ -80,7 +82,7 @@ class LiveHyp(GateClaim):
             ]
         if longest_s > allowed_s + TIME_TOLERANCE_S:
             wrong.append({**where, "what": "longer from its own task than allowed, s", "found": longest_s})
-        total = [acceptance for of_ugv in found.values() for acceptance in of_ugv]
+        total = [acceptance for of_ugv in accepted.values() for acceptance in of_ugv]
         return Finding(
             "refuted" if wrong else "holds",
             margin=allowed_s - longest_s if not wrong or longest_s > allowed_s else None,

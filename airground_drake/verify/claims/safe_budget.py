@@ -80,10 +80,10 @@ class SafeBudget(TheoremClaim):
             },
             "pairs": [
                 {
-                    "first": one.first, "second": one.second, "kind": one.kind, "law_m": one.law_m,
-                    "safe_m": one.promised_m + one.radii_m,
+                    "first": pair.first, "second": pair.second, "kind": pair.kind, "law_m": pair.law_m,
+                    "safe_m": pair.promised_m + pair.radii_m,
                 }
-                for one in (group[0] for group in alike(budget(scenario))) if one.terms
+                for pair in (group[0] for group in alike(budget(scenario))) if pair.terms
             ],
         }  # fmt: skip
 
@@ -111,7 +111,8 @@ class SafeBudget(TheoremClaim):
     def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
         bounds = {name: plant.bounds(speed) for name, (plant, speed) in _plants(inputs).items()}
         for pair in inputs["pairs"]:
-            both, passive = (bounds[pair["first"]], bounds.get(pair["second"], AT_REST)), pair["kind"] == "moving"
+            both = (bounds[pair["first"]], bounds.get(pair["second"], AT_REST))
+            passive = pair["kind"] == "moving"
             kept = kept_distance(pair["law_m"], *both, gain=inputs["avoidance_gain_1_s"], passive=passive)
             says = (
                 f"{pair['first']}, {pair['second']}: {pair['law_m']:.6g} m in the law keep {kept:.6g} m, at least "

@@ -100,13 +100,13 @@ class SafeDist(TheoremClaim):
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
-        found = [
+        stability = [
             *stable(gain, h),
             Hypothesis.of("A", "the gain A is above 0: it restores a distance", gain, "1/s", strict=True),
         ]
         if gain <= 0:
-            return found
-        return found + [
+            return stability
+        return stability + [
             Hypothesis.of(self.margin_of, f"{pair.kind}: d - W/A is above 0", left_m(inputs, pair), "m", strict=True)
             for pair in kinds_of(inputs)
         ]

@@ -177,7 +177,8 @@ class SafeHyp(TraceClaim):
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
         broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **difference} for difference in different[:1]]
         first = min(broken, key=lambda entry: float(entry["t_s"]), default=None)
-        worst, listed = _worst(others), [_listed(trace, promised) for promised in kept[:MOST_LISTED]]
+        worst = _worst(others)
+        listed = [_listed(trace, promised) for promised in kept[:MOST_LISTED]]
         shown = _shown(first, worst, listed, kept)
         name = shown["hypothesis"]
         in_range, binding = _binding(trace)
@@ -208,24 +209,24 @@ class SafeHyp(TraceClaim):
 
 def _against(trace: Trace, first: dict[str, Any], broken: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The hypothesis broken first, with what is needed to redo it by hand."""
-    found = first | snapshot(trace, map(str, first.values()), first["t_s"])
+    against = first | snapshot(trace, map(str, first.values()), first["t_s"])
     if first["hypothesis"] != DECLARED:
-        return found
+        return against
     declared = trace.scenario.barriers[first["other"]].expected_speed_m_s
     told = f"{first['other']} moved at {declared - first['margin']:.2f} m/s at {first['t_s']:.2f} s"
     more = sorted({str(entry["hypothesis"]) for entry in broken} - {DECLARED})
-    return found | {"why": f"{told}, declared {declared:.2f}", "also_broken": more}
+    return against | {"why": f"{told}, declared {declared:.2f}", "also_broken": more}
 
 
 def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
     """Where each hypothesis has its least margin, for each robot or pair that it is about."""
-    found: dict[tuple[str, str], dict[str, Any]] = {}
+    least: dict[tuple[str, str], dict[str, Any]] = {}
     for h in hypotheses:
         entry = h.at(int(np.argmin(h.margin)))
         key = h.name, str(next(iter(h.about.values()), ""))
-        if entry["margin"] <= found.get(key, entry)["margin"]:
-            found[key] = entry
-    return list(found.values())
+        if entry["margin"] <= least.get(key, entry)["margin"]:
+            least[key] = entry
+    return list(least.values())
 
 
 def _shown(
@@ -282,7 +283,8 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         begin = int(np.searchsorted(samples, pair.row))
         end = int(np.searchsorted(samples, pair.last)) + 1
         there, planar = slice(begin, end), is_planar(trace, pair.first)
-        first, beside = places[pair.first][there], _beside(trace, pair, places, there, float(reach[k]))
+        first = places[pair.first][there]
+        beside = _beside(trace, pair, places, there, float(reach[k]))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
         missed = [shortfalls(first, place, pair.law_m, *asked, core, planar=planar) for place, core in beside]
         begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.law_m, core, planar=planar) for place, core in beside]
@@ -397,7 +399,10 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     """Hypotheses at the control samples: their spacing, straight motion between them, speed limits, planar motion."""
-    period, robots, t, samples = trace.scenario.control.period_s, trace.scenario.robots, trace.t, trace.sample_rows
+    period = trace.scenario.control.period_s
+    robots = trace.scenario.robots
+    t = trace.t
+    samples = trace.sample_rows
     spacing = np.diff(np.append(t[samples], t[-1]))
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
     ends = np.append(samples, len(t) - 1)
@@ -443,13 +448,13 @@ class OwnPlant:
 
 def own_plants(trace: Trace) -> list[OwnPlant]:
     """All robots with users' plants."""
-    found = []
+    plants = []
     for name, robot in trace.scenario.robots.items():
         if measured := trace.plant(name).measured:
             drift, cover = (float(trace.sampled(f"{name}.{key}").max()) for key in measured)
             bounds, (keys,) = bounds_of(trace)[name], robot.plant
-            found.append(OwnPlant(name, keys.kind, drift, bounds.drift_m_s, cover, bounds.cover_m))
-    return found
+            plants.append(OwnPlant(name, keys.kind, drift, bounds.drift_m_s, cover, bounds.cover_m))
+    return plants
 
 
 def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:

@@ -63,8 +63,8 @@ class SafeOwn(TraceClaim):
 
     def check(self, trace: Trace) -> Finding:
         """The least of the margins of all robots in all pairs."""
-        found = sorted(_margins(trace), key=lambda own: own.margin_m)
-        worst = found[0] if found else None
+        margins = sorted(_margins(trace), key=lambda own: own.margin_m)
+        worst = margins[0] if margins else None
         own = worst is not None and not worst.margin_m >= -DISTANCE_TOLERANCE_M
         within_reach = [periods.apart_m < periods.keeps_m + periods.pair.reach_m for periods in beside(trace)]
         return Finding(
@@ -75,7 +75,7 @@ class SafeOwn(TraceClaim):
             where=worst._asdict() if worst else {},
             counterexample=_against(trace, worst) if worst and own else None,
             evidence={
-                "robots_beside_others": [own._asdict() for own in found[:MOST_LISTED]],
+                "robots_beside_others": [own._asdict() for own in margins[:MOST_LISTED]],
                 "tolerance_m": DISTANCE_TOLERANCE_M,
             },
             exercised=sum(int(near.sum()) for near in within_reach),

@@ -128,7 +128,7 @@ def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int)
     high = float(betainccinv(wrong + 1, count - wrong, tail)) if wrong < count else 1.0
     rate = wrong / count
     spread = math.sqrt(max(rate * (1.0 - rate), 1.0 / count) / count)
-    found = (
+    estimates = (
         ("mean decision time", "s", (mean - 0.25) * period, deviation * period, time, formula[0]),
         ("error rate", "", rate, spread, [low - ERROR_ALLOWANCE, high + ERROR_ALLOWANCE], formula[1]),
     )
@@ -140,5 +140,5 @@ def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int)
             formula=value, z_score=(estimate - value) / error,
             margin=2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
         )
-        for quantity, unit, estimate, error, interval, value in found
+        for quantity, unit, estimate, error, interval, value in estimates
     ]  # fmt: skip

@@ -68,12 +68,12 @@ class ThrOpt(TheoremClaim):
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         rule = rule_of(inputs)
-        found = ThrRoot().hypotheses(inputs)
+        of_root = ThrRoot().hypotheses(inputs)
         if rule.c1 == rule.c2:
-            return [*found, Hypothesis.of(self.margin_of, "c1 = c2: both equations have the same root", Fraction(0))]
+            return [*of_root, Hypothesis.of(self.margin_of, "c1 = c2: both equations have the same root", Fraction(0))]
         printed = rule.printed_root
         return [
-            *found,
+            *of_root,
             *two_signs("the printed (19)", printed),
             Hypothesis.of(self.margin_of, "the risk at the printed root is higher", _gap(rule, printed), strict=True),
         ]

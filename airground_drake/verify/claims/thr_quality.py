@@ -234,8 +234,8 @@ class Judge:
         """The first time at which e is at the threshold or above, s; None: not in this interval."""
         if self.e.at(after) >= self.zeta:
             return after
-        found = self.e.reaches(self.zeta, after, above=True)
-        return found if found is not None and found <= before else None
+        reached = self.e.reaches(self.zeta, after, above=True)
+        return reached if reached is not None and reached <= before else None
 
     def _peak(self, begin: float, end: float) -> float:
         """The largest e between two times, m: e is monotone between knots."""
@@ -256,15 +256,15 @@ def drift_of(e: NormSignal, zeta: float) -> float | None:
 def _ddm(decisions: Sequence[Decided], zeta: float, drift: float, noise: float) -> Ddm:
     """The decisions about a UGV beside (17)-(18), without initial deviation."""
     alone = zeta / drift
-    k = alone * (drift / noise) ** 2 if noise > 0.0 else math.inf
+    scale = alone * (drift / noise) ** 2 if noise > 0.0 else math.inf
     late = [decided.late_s for decided in decisions if decided.late_s is not None and decided.kind != "missed"]
     wrong = sum(decided.kind in ("false", "missed") for decided in decisions)
     return Ddm(
         drift_m_s=drift,
         noise_m_sqrt_s=noise,
         error_rate=wrong / len(decisions) if decisions else None,
-        error_rate_of_18=0.5 * (1.0 - math.tanh(k)),
+        error_rate_of_18=0.5 * (1.0 - math.tanh(scale)),
         decision_time_s=alone + sum(late) / len(late) if late else None,
-        decision_time_of_17_s=alone * math.tanh(k),
+        decision_time_of_17_s=alone * math.tanh(scale),
         decision_time_without_noise_s=alone,
     )

@@ -97,10 +97,10 @@ def rule_of(inputs: dict[str, Any]) -> ThresholdRule:
 
 def two_signs(what: str, ends: RootInterval) -> list[Hypothesis]:
     """That a function is below 0 at the lower end of an enclosure, and above 0 at the upper one."""
-    found = zip(("below", "above"), ends[:2], (-ends.signs[0], ends.signs[1]), strict=True)
+    signs = zip(("below", "above"), ends[:2], (-ends.signs[0], ends.signs[1]), strict=True)
     return [
         Hypothesis.of(f"sign of {what}", f"{what} is {side} 0 at u = {float(u)!r}", Fraction(right), strict=True)
-        for side, u, right in found
+        for side, u, right in signs
     ]
 
 

@@ -136,8 +136,8 @@ def isolation(noise_period_s: float, period_s: float, levels: TriggerLevels) -> 
         Hypothesis.of("noise periods beside control samples", says, -(steps % 1)),
         Hypothesis.of("control periods in a noise period", "there is at least one", steps - 1),
     ]
-    found = grounds(THEOREMS, hypotheses)
-    return {"isolation": found["reason"] or found["proof"], "hypotheses": hypotheses}
+    ground = grounds(THEOREMS, hypotheses)
+    return {"isolation": ground["reason"] or ground["proof"], "hypotheses": hypotheses}
 
 
 class TriggerLevels(NamedTuple):
@@ -257,11 +257,12 @@ def _variable(trace: Trace, ugv: str) -> tuple[NormSignal, dict[str, Any], Confl
     if _block(trace):
         return recorded, {"status": "not_run", "reason": "another block computes the decision variable"}, None
     rebuilt = decision_variable(trace, ugv)
-    value, port = rebuilt.at(trace.t), trace.column(f"{ugv}.decision_variable_m")
+    value = rebuilt.at(trace.t)
+    port = trace.column(f"{ugv}.decision_variable_m")
     off = np.abs(port - value)
-    found = {"status": "holds", "largest_difference_m": float(off.max())}
+    compared = {"status": "holds", "largest_difference_m": float(off.max())}
     if not (off > VARIABLE_TOLERANCE_M).any():
-        return rebuilt, found, None
+        return rebuilt, compared, None
     k = int(np.argmax(off > VARIABLE_TOLERANCE_M))
     conflict = {
         "t_s": float(trace.t[k]),
@@ -270,7 +271,7 @@ def _variable(trace: Trace, ugv: str) -> tuple[NormSignal, dict[str, Any], Confl
         "recorded_m": float(port[k]),
         "difference_m": float(off[k]),
     }
-    return recorded, {**found, "status": "refuted"}, conflict
+    return recorded, {**compared, "status": "refuted"}, conflict
 
 
 def _mode_conflict(trace: Trace, ugv: str, predicted: list[Transition]) -> Conflict | None:

@@ -80,7 +80,8 @@ class ZenoProof(TheoremClaim):
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """Two triggers closer than the bound, on a run of the automaton: up, down and up again."""
-        trigger, bound = trigger_of(inputs), inputs["min_inter_event_s"] or SHORTEST_S
+        trigger = trigger_of(inputs)
+        bound = inputs["min_inter_event_s"] or SHORTEST_S
         gap = max(trigger.dwell, bound / 2.0)
         if not gap < bound:
             return None

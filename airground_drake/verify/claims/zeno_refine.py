@@ -145,7 +145,7 @@ class ZenoRefine(ModelClaim):
         return judge_experiment(experiment(inputs))
 
 
-def series(setting: Refinement, found: dict[str, Array]) -> Series:
+def series(setting: Refinement, triggers: dict[str, Array]) -> Series:
     """The evidence, from the counts of an experiment."""
     dt, dwell = np.array(setting.dt_s), setting.trigger.dwell
     expected = np.array([expected_bare(setting, step) for step in setting.dt_s])
@@ -153,16 +153,16 @@ def series(setting: Refinement, found: dict[str, Array]) -> Series:
     weights = rng.multinomial(PATHS, np.full(PATHS, 1.0 / PATHS), RESAMPLES) / PATHS
     fits = dict[str, Fit]()
     for name in ("bare", "automaton"):
-        intercept, exponent, correction = _fit(dt, found[name].mean(axis=0)).tolist()
-        resampled = _fit(dt, weights @ found[name])[1]
+        intercept, exponent, correction = _fit(dt, triggers[name].mean(axis=0)).tolist()
+        resampled = _fit(dt, weights @ triggers[name])[1]
         interval = np.quantile(resampled, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0]).tolist()
         at_dt = (np.exp(intercept + correction * np.sqrt(dt)) * dt**exponent).tolist()
         fits[name] = Fit(exponent, interval, intercept, correction, at_dt)
     return Series(
         dt_s=dt.tolist(),
-        **{name: _counted(found[name]) for name in SERIES},
+        **{name: _counted(triggers[name]) for name in SERIES},
         expected_bare=expected.tolist(),
-        counts={name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in found.items()},
+        counts={name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in triggers.items()},
         fit=fits,
         bias=float(_fit(dt, expected)[1]) + 0.5,
         most_triggers=int(setting.duration_s / dwell + 1e-9) + 1 if dwell > 0.0 else None,
@@ -190,8 +190,8 @@ def _fit(dt: Array, mean: Array) -> Array:
 
 def judge_experiment(setting: Refinement) -> Finding:
     """The finding of an experiment by the rule of the module docstring."""
-    found = counts(setting)
-    evidence = series(setting, found)
+    triggers = counts(setting)
+    evidence = series(setting, triggers)
     bare, ours = evidence.fit["bare"], evidence.fit["automaton"]
     (low, high), (ours_low, ours_high) = bare.interval, ours.interval
     bias = abs(evidence.bias)
@@ -210,7 +210,7 @@ def judge_experiment(setting: Refinement) -> Finding:
     broken: dict[str, Any] | None = None
     if most is not None and largest > most:
         status = "refuted"
-        i, j = (int(k) for k in np.argwhere(found["automaton"] == largest)[0])
+        i, j = (int(index) for index in np.argwhere(triggers["automaton"] == largest)[0])
         what = "more triggers than the dwell admits"
         broken = {"what": what, "path": i, "dt_s": setting.dt_s[j], "triggers": largest}
     elif max(high - low, ours_high - ours_low) > 2.0 * FLAT_WITHIN:

@@ -73,8 +73,8 @@ class ZenoTrace(TraceClaim):
         evidence = asdict(Gaps(triggers, bound, int(trace.scenario.duration_s / bound) + 1))
         gaps = [
             TriggerGap(after - before, ugv, before, after)
-            for ugv, found in triggers.items()
-            for before, after in pairwise(found.t_s)
+            for ugv, of_ugv in triggers.items()
+            for before, after in pairwise(of_ugv.t_s)
         ]
         if not gaps:
             return Finding("holds", evidence=evidence | {"reason": "no UGV was triggered twice"}, exercised=0)

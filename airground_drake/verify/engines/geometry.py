@@ -130,8 +130,8 @@ def _minima(t: Array, parts: Array) -> Array:
     whole = np.ldexp(length, exponent[moving])
     inside = (towards > 0.0) & (towards < whole)
     u = towards[inside] / whole[inside]
-    found: Array = t[:-1][moving][inside] + u * np.diff(t)[moving][inside]
-    return found[u < 1.0]
+    turning: Array = t[:-1][moving][inside] + u * np.diff(t)[moving][inside]
+    return turning[u < 1.0]
 
 
 ROWS = 32  # Of a block. Between rows a robot moves straight, so on a block it stays in the box around its rows.
@@ -158,9 +158,9 @@ def boxes_of(positions: Array) -> Boxes:
 
 def apart_at_least(boxes: Boxes, first: Indices, second: Indices) -> Array:
     """Bounds from below of the distances of P pairs of things, given by their numbers (P,): (P,), m."""
-    found = np.empty(len(first))
+    least = np.empty(len(first))
     for some in np.array_split(np.arange(len(first)), len(first) * boxes.low.shape[1] // AT_ONCE + 1):
-        one, other = first[some], second[some]
-        gap = np.maximum(boxes.low[one] - boxes.high[other], boxes.low[other] - boxes.high[one])
-        found[some] = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)).min(axis=1)
-    return found - ROUNDING_M
+        these, those = first[some], second[some]
+        gap = np.maximum(boxes.low[these] - boxes.high[those], boxes.low[those] - boxes.high[these])
+        least[some] = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2)).min(axis=1)
+    return least - ROUNDING_M

@@ -45,8 +45,8 @@ class Cores:
     def of(cls, rows: Array) -> Cores:
         """The cores of outlines (m, W)."""
         count = rows[:, COUNT].astype(np.intp)
-        k = np.arange(count.max(initial=1))
-        column = CORNERS + 2 * np.where(k < count[:, None], k, 0)
+        corner = np.arange(count.max(initial=1))
+        column = CORNERS + 2 * np.where(corner < count[:, None], corner, 0)
         corners = np.stack([np.take_along_axis(rows, column + axis, axis=1) for axis in (0, 1)], axis=-1)
         return cls(corners, rows[:, BASE], rows[:, TOP])
 
@@ -65,16 +65,16 @@ class Cores:
     @classmethod
     def joined(cls, some: Sequence[Cores]) -> Cores:
         """Several arrays of cores, (m, n, 2) each, one after the other."""
-        most = max((each.corners.shape[1] for each in some), default=1)
+        most = max((part.corners.shape[1] for part in some), default=1)
         padded = [
-            np.concatenate([each.corners, np.repeat(each.corners[:, :1], most - each.corners.shape[1], axis=1)], axis=1)
-            for each in some
+            np.concatenate([part.corners, np.repeat(part.corners[:, :1], most - part.corners.shape[1], axis=1)], axis=1)
+            for part in some
         ]
         none = np.empty(0)
         return cls(
             np.concatenate([np.empty((0, most, 2)), *padded]),
-            np.concatenate([none, *(each.base for each in some)]),
-            np.concatenate([none, *(each.top for each in some)]),
+            np.concatenate([none, *(part.base for part in some)]),
+            np.concatenate([none, *(part.top for part in some)]),
         )
 
     def take(self, rows: Any) -> Cores:
@@ -108,10 +108,10 @@ def unpacked(numbers: Sequence[float]) -> Array:
             raise ValueError(f"the numbers from the {begin + 1}. on are no outline")
         rows.append(numbers[begin:end])
         begin = end
-    found = np.zeros((len(rows), max(map(len, rows), default=CORNERS + 2)))
-    for row, outline in zip(found, rows, strict=True):
+    padded = np.zeros((len(rows), max(map(len, rows), default=CORNERS + 2)))
+    for row, outline in zip(padded, rows, strict=True):
         row[: len(outline)] = outline
-    return found
+    return padded
 
 
 class Away(NamedTuple):
@@ -189,16 +189,16 @@ def least_distances(cores: Cores, start: Array, end: Array, *, planar: bool) -> 
     start, end = (np.broadcast_to(place, (*shape, 3)) for place in (start, end))
     if cores.are_points:
         return PeriodMotion(start - cores.points, end - cores.points).least_distance()
-    found, share = _least(cores, start, end, _turning_points(cores, start, end, planar), planar)
-    deep = (found <= TOUCHING_M) & _edges(cores.corners).solid
+    least, share = _least(cores, start, end, _turning_points(cores, start, end, planar), planar)
+    deep = (least <= TOUCHING_M) & _edges(cores.corners).solid
     if deep.any():
-        corners = np.broadcast_to(cores.corners, (*found.shape, *cores.corners.shape[-2:]))[deep]
-        some = Cores(corners, *(np.broadcast_to(part, found.shape)[deep] for part in (cores.base, cores.top)))
+        corners = np.broadcast_to(cores.corners, (*least.shape, *cores.corners.shape[-2:]))[deep]
+        some = Cores(corners, *(np.broadcast_to(part, least.shape)[deep] for part in (cores.base, cores.top)))
         further = _equally_near(some, start[deep], end[deep], planar)
         deepest, there = _least(some, start[deep], end[deep], further, planar)
-        lower = deepest < found[deep]
-        found[deep], share[deep] = np.where(lower, deepest, found[deep]), np.where(lower, there, share[deep])
-    return found, share
+        lower = deepest < least[deep]
+        least[deep], share[deep] = np.where(lower, deepest, least[deep]), np.where(lower, there, share[deep])
+    return least, share
 
 
 def _least(cores: Cores, start: Array, end: Array, shares: Array, planar: bool) -> tuple[Array, Array]:
@@ -221,16 +221,18 @@ def _turning_points(cores: Cores, start: Array, end: Array, planar: bool) -> Arr
     ends = np.broadcast_to([0.0, 1.0], (*passed.shape[:-1], 2))
     if planar:
         return np.concatenate([ends, crossed, passed], axis=-1)
-    levels, found = np.stack([cores.base, cores.top], axis=-1) - start[..., 2:], [ends, crossed, passed]
-    found.append(np.broadcast_to(levels / step[..., 0, 2:], (*passed.shape[:-1], 2)))
+    levels = np.stack([cores.base, cores.top], axis=-1) - start[..., 2:]
+    shares = [ends, crossed, passed]
+    shares.append(np.broadcast_to(levels / step[..., 0, 2:], (*passed.shape[:-1], 2)))
     whole = np.square(step).sum(axis=-1)
-    length, both = np.square(edges.vector).sum(axis=-1), (edges.vector * flat).sum(axis=-1)
+    length = np.square(edges.vector).sum(axis=-1)
+    both = (edges.vector * flat).sum(axis=-1)
     for level in (levels[..., :1], levels[..., 1:]):
         ahead = (to * flat).sum(axis=-1) + level * step[..., 2]
-        found.append(ahead / whole)
+        shares.append(ahead / whole)
         aside = (to * edges.vector).sum(axis=-1)
-        found.append((length * ahead - both * aside) / (whole * length - both**2))
-    return np.concatenate(found, axis=-1)
+        shares.append((length * ahead - both * aside) / (whole * length - both**2))
+    return np.concatenate(shares, axis=-1)
 
 
 @np.errstate(divide="ignore", invalid="ignore")
@@ -253,13 +255,13 @@ def apart_by_blocks(cores: Cores, places: Array) -> Array:
     # Between rows the way is straight. The bounds are distances of boxes; where boxes overlap, no depth is greater than
     # half the shortest side of the core's.
     (low, high), (inner, outer) = (side[0] for side in boxes_of(places[None])), cores.box
-    found = np.empty((len(inner), len(low)))
+    least = np.empty((len(inner), len(low)))
     for some in np.array_split(np.arange(len(inner)), len(inner) * len(low) // AT_ONCE + 1):
         gap = np.maximum(inner[some, None] - high, low - outer[some, None])
         apart = np.sqrt(np.square(np.maximum(gap, 0.0)).sum(axis=2))
         deepest = 0.5 * (outer[some] - inner[some])[:, :2].min(axis=1)
-        found[some] = np.where((gap <= 0.0).all(axis=2), -deepest[:, None], apart)
-    return found - ROUNDING_M
+        least[some] = np.where((gap <= 0.0).all(axis=2), -deepest[:, None], apart)
+    return least - ROUNDING_M
 
 
 class Nearest(NamedTuple):
@@ -285,21 +287,22 @@ def closest(cores: Cores, places: Array, *, planar: bool) -> Nearest:
         core = cores.take(which[:, None])
         distance, share = least_distances(core, places[segment], places[segment + 1], planar=planar)
         k = np.lexsort([share.ravel(), segment.ravel(), distance.ravel()])[0]
-        found = Nearest(float(distance.flat[k]), int(segment.flat[k]) + 1, float(share.flat[k]))
-        best = min(best, found)
+        nearest = Nearest(float(distance.flat[k]), int(segment.flat[k]) + 1, float(share.flat[k]))
+        best = min(best, nearest)
     return best
 
 
 def over_time(cores: Cores, places: Array, *, planar: bool) -> Array:
     """Distances of places (T, 3), m, from the nearest of m cores, (T,), m."""
-    bounds, found = apart_by_blocks(cores, places), np.full(len(places), np.inf)
+    bounds = apart_by_blocks(cores, places)
+    least = np.full(len(places), np.inf)
     for block in range(bounds.shape[1]):
         rows = slice(block * ROWS, (block + 1) * ROWS + (block == bounds.shape[1] - 1))
         first = int(bounds[:, block].argmin())
         most = away_from(cores.take(first), places[rows], planar=planar).distance.max()
         near = cores.take(np.flatnonzero(bounds[:, block] <= most)[:, None])
-        found[rows] = away_from(near, places[rows], planar=planar).distance.min(axis=0)
-    return found
+        least[rows] = away_from(near, places[rows], planar=planar).distance.min(axis=0)
+    return least
 
 
 class Contacts(NamedTuple):
@@ -312,12 +315,12 @@ class Contacts(NamedTuple):
 
 def within(cores: Cores, places: Array, reach: float, *, planar: bool) -> Contacts:
     """Pairs of a place and a core within a distance, m: K places (K, 3), m, in the order of a way, and m cores."""
-    found = list(_within(cores, places, reach, planar)) if len(places) else []
+    blocks = list(_within(cores, places, reach, planar)) if len(places) else []
     none = np.empty(0, dtype=np.intp)
-    place, core = (np.concatenate([none, *(each[k] for each in found)]) for k in (0, 1))
+    place, core = (np.concatenate([none, *(contacts[k] for contacts in blocks)]) for k in (0, 1))
     order = np.lexsort([core, place])
-    distance = np.concatenate([np.empty(0), *(each[2].distance for each in found)])
-    normal = np.concatenate([np.empty((0, 3)), *(each[2].normal for each in found)])
+    distance = np.concatenate([np.empty(0), *(contacts[2].distance for contacts in blocks)])
+    normal = np.concatenate([np.empty((0, 3)), *(contacts[2].normal for contacts in blocks)])
     return Contacts(place[order], core[order], Away(distance[order], normal[order]))
 
 
@@ -327,7 +330,8 @@ def _within(cores: Cores, places: Array, reach: float, planar: bool) -> Iterator
         place = block[some, None] * ROWS + np.arange(ROWS + 1)
         last = block[some, None] == (len(places) - 2) // ROWS  # the row at which a block ends belongs to the next one
         there = (place < len(places)) & ((np.arange(ROWS + 1) < ROWS) | last)
-        place, core = place[there], np.broadcast_to(which[some, None], there.shape)[there]
+        place = place[there]
+        core = np.broadcast_to(which[some, None], there.shape)[there]
         away = away_from(cores.take(core), places[place], planar=planar)
         near = away.distance <= reach
         yield Contacts(place[near], core[near], Away(away.distance[near], away.normal[near]))
@@ -338,5 +342,5 @@ def nearest_point(cores: Cores, place: Array, *, planar: bool) -> Array:
     away = away_from(cores, place, planar=planar)
     k = int(away.distance.argmin())
     core = cores.take(slice(k, k + 1))
-    found: Array = core.points[0] if core.are_points else place - away.distance[k] * away.normal[k]
-    return found
+    point: Array = core.points[0] if core.are_points else place - away.distance[k] * away.normal[k]
+    return point

@@ -51,17 +51,17 @@ def shortfalls(
     # gain: a.
     # planar: whether the first body stays in its plane: then no way leads out of a core through its top.
     other = np.broadcast_to(second, first.shape)
-    found = np.zeros(len(first) - 1)
+    missed = np.zeros(len(first) - 1)
     pair = _Pair(core, planar, Fraction(d), share, gain, held)
     for k in _doubtful(first, other, pair, float(last)).tolist():
         ends = np.stack([first[k], first[k + 1], other[k], other[k] if held else other[k + 1]])
-        found[k] = rounded_up(_shortfall(ends, pair, last if k == len(found) - 1 else Fraction(1)))
-    return found
+        missed[k] = rounded_up(_shortfall(ends, pair, last if k == len(missed) - 1 else Fraction(1)))
+    return missed
 
 
-def shortage(one: Array, other: Array, d: float, core: Cores = POINT, *, planar: bool = False) -> Fraction:
+def shortage(place: Array, other: Array, d: float, core: Cores = POINT, *, planar: bool = False) -> Fraction:
     """By how much a place (3,), m, is closer than d, m, to a core about another place, from above; 0 if it is not."""
-    (here, there), shape, unit = _in_units(np.stack([one, other]), core)
+    (here, there), shape, unit = _in_units(np.stack([place, other]), core)
     return max(Fraction(d) - _apart(_ways_off(shape, _minus(here, there), planar, unit)), Fraction(0))
 
 
@@ -82,7 +82,8 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArr
     normal[~normal.any(axis=1)] = np.nan
     d, share = float(pair.d), float(pair.share)
     bound = demanded(d - distance, float(pair.gain), 1.0)
-    met, reach = np.ones(len(distance), dtype=np.bool_), np.zeros(len(distance))
+    met = np.ones(len(distance), dtype=np.bool_)
+    reach = np.zeros(len(distance))
     for body, sign, part in ((first, 1.0, share), (other, -1.0, 1.0 - share)):
         step = np.zeros_like(body[1:]) if pair.held and sign < 0.0 else np.diff(body, axis=0)
         step[-1] /= last
@@ -97,20 +98,21 @@ def _shortfall(ends: Array, pair: _Pair, lasts: Fraction) -> Fraction:
     (here, after, there, beyond), shape, unit = _in_units(ends, pair.core)
     steps = (_minus(after, here), _minus(beyond, there))
     ways = _ways_off(shape, _minus(here, there), pair.planar, unit)
-    apart, reach = _apart(ways), sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
+    apart = _apart(ways)
+    reach = sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
     if apart >= pair.d + reach:
         return Fraction(0)
     if not ways:  # n is unknown: along any n a step is at least minus its length
         return pair.gain * pair.d + reach
     bound = demanded(pair.d - apart, pair.gain, Fraction(1))  # it decreases with the distance
-    found = list[Fraction]()
+    totals = list[Fraction]()
     for way in ways:
         missed = apart - way.apart
         for step, sign, part in zip(steps, (1, -1), (pair.share, 1 - pair.share), strict=True):
             along = Fraction(sign * _dot(way.normal, step), unit) / lasts
             missed += max(part * bound - min(along / length for length in _length(way.normal, 1)), Fraction(0))
-        found.append(missed)
-    return min(found)
+        totals.append(missed)
+    return min(totals)
 
 
 class _Shape(NamedTuple):
@@ -138,7 +140,7 @@ def _ways_off(shape: _Shape, place: Sequence[int], planar: bool, unit: int) -> l
     faces = [([ey, -ex, 0], (x - ax) * ey - (y - ay) * ex) for (ax, ay), (ex, ey) in edges]
     if count > 2 and all(side <= 0 for _, side in faces):
         faces += [] if planar else [([0, 0, 1], z - shape.top), ([0, 0, -1], shape.base - z)]
-        ways = [_Way(normal, min(Fraction(side, unit) / each for each in _length(normal, 1))) for normal, side in faces]
+        ways = [_Way(normal, min(Fraction(side, unit) / norm for norm in _length(normal, 1))) for normal, side in faces]
         return [way for way in ways if way.apart >= _apart(ways) - TIE_M]
     rise = z - min(max(z, shape.base), shape.top)
     vectors = [([x - ax, y - ay, rise], 1) for ax, ay in corners]
@@ -146,7 +148,7 @@ def _ways_off(shape: _Shape, place: Sequence[int], planar: bool, unit: int) -> l
         squared = ex * ex + ey * ey
         if 0 < (x - ax) * ex + (y - ay) * ey < squared:
             vectors.append(([ey * side, -ex * side, rise * squared], squared))
-    vector, scale = min(vectors, key=lambda each: Fraction(_dot(each[0], each[0]), each[1] ** 2))
+    vector, scale = min(vectors, key=lambda option: Fraction(_dot(option[0], option[0]), option[1] ** 2))
     if any(vector):
         return [_Way(vector, _length(vector, unit * scale)[0])]
     return [_Way([sign * part for part in faces[0][0]], Fraction(0)) for sign in (1, -1)] if count == 2 else []
@@ -164,8 +166,8 @@ def _in_units(places: Array, core: Cores) -> tuple[list[list[int]], _Shape, int]
     ratios = [x.as_integer_ratio() for x in numbers]
     unit = max(bottom for _, bottom in ratios)
     whole = iter([top * (unit // bottom) for top, bottom in ratios])
-    found = [_next(whole, 3) for _ in places]
-    return found, _Shape([_next(whole, 2) for _ in corners], *_next(whole, 2)), unit
+    whole_places = [_next(whole, 3) for _ in places]
+    return whole_places, _Shape([_next(whole, 2) for _ in corners], *_next(whole, 2)), unit
 
 
 def _next(numbers: Iterator[int], count: int) -> list[int]:
@@ -175,19 +177,19 @@ def _next(numbers: Iterator[int], count: int) -> list[int]:
 def _length(vector: Sequence[int], unit: int) -> tuple[Fraction, Fraction]:
     """Bounds of the length of a vector in units, m; both are exact where the length is a whole number of units."""
     squared, scale = _dot(vector, vector) << (2 * BITS), unit << BITS
-    found = isqrt(squared)
-    return Fraction(found, scale), Fraction(found + (found * found < squared), scale)
+    root = isqrt(squared)
+    return Fraction(root, scale), Fraction(root + (root * root < squared), scale)
 
 
 def rounded_up(value: Fraction) -> float:
     """The least double that is not below a number."""
-    found = float(value)
-    return found if Fraction(found) >= value else nextafter(found, inf)
+    double = float(value)
+    return double if Fraction(double) >= value else nextafter(double, inf)
 
 
-def _minus(one: Sequence[int], other: Sequence[int]) -> list[int]:
-    return [a - b for a, b in zip(one, other, strict=True)]
+def _minus(first: Sequence[int], second: Sequence[int]) -> list[int]:
+    return [a - b for a, b in zip(first, second, strict=True)]
 
 
-def _dot(one: Sequence[int], other: Sequence[int]) -> int:
-    return sum(a * b for a, b in zip(one, other, strict=True))
+def _dot(first: Sequence[int], second: Sequence[int]) -> int:
+    return sum(a * b for a, b in zip(first, second, strict=True))

@@ -47,8 +47,8 @@ class ThresholdRule(NamedTuple):
 
     def residual(self, ratio: Fraction) -> Function:
         """f for r = ratio, s."""
-        k = self.noise**2 / self.drift**2
-        return lambda u: ball(k) * (u.sinh() + u) - ball(ratio)
+        scale = self.noise**2 / self.drift**2
+        return lambda u: ball(scale) * (u.sinh() + u) - ball(ratio)
 
     @property
     def root(self) -> RootInterval:
@@ -62,9 +62,9 @@ class ThresholdRule(NamedTuple):
 
     def risk(self, u: Any) -> Any:
         """The Bayes risk (16) without initial deviation, at a ball u."""
-        k = self.noise**2 / self.drift**2
+        scale = self.noise**2 / self.drift**2
         q = u.exp()
-        return (ball(self.c1 * k / 2) * u * (q - 1) + ball(self.c2)) / (q + 1)
+        return (ball(self.c1 * scale / 2) * u * (q - 1) + ball(self.c2)) / (q + 1)
 
 
 def ball(value: Fraction) -> Any:
@@ -80,8 +80,8 @@ def value(function: Function, u: Fraction) -> Any:
 
 def sign(function: Function, u: Fraction) -> int:
     """The sign of the function at u: -1 or 1; 0 if the ball contains 0, which leaves the sign open."""
-    found = value(function, u)
-    return int(bool(found > 0)) - int(bool(found < 0))
+    at_u = value(function, u)
+    return int(bool(at_u > 0)) - int(bool(at_u < 0))
 
 
 def enclose(function: Function, low: Fraction, high: Fraction | None = None) -> RootInterval:
@@ -90,10 +90,10 @@ def enclose(function: Function, low: Fraction, high: Fraction | None = None) -> 
     # high: above it; None: found by doubling.
 
     def sure(u: Fraction) -> int:
-        found = sign(function, u)
-        if not found:
+        side = sign(function, u)
+        if not side:
             raise ArithmeticError(f"the sign at u = {float(u):g} is open")
-        return found
+        return side
 
     if high is None:
         low, high = max(low, Fraction(1, 2**200)), max(2 * low, Fraction(1))

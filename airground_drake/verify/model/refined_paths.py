@@ -67,11 +67,11 @@ def path(setting: Refinement, index: int) -> list[Array]:
     rng = np.random.default_rng([SEED, index])
     start = math.sqrt(coarse) * rng.standard_normal()
     increments = math.sqrt(setting.dt_s[-1]) * rng.standard_normal(steps[-1])
-    found = []
+    paths = []
     for dt, count in zip(setting.dt_s, steps, strict=True):
         summed = increments.reshape(count, -1).sum(axis=1)
-        found.append(leaky_sum(1.0 - setting.leak_1_s * dt, np.concatenate([[start], summed])))
-    return found
+        paths.append(leaky_sum(1.0 - setting.leak_1_s * dt, np.concatenate([[start], summed])))
+    return paths
 
 
 def triggers(trigger: Trigger, x: Array, dt: float) -> list[float]:
@@ -116,8 +116,8 @@ def leaky_sum(keep: float, added: Array) -> Array:
     """y[k] = keep * y[k-1] + added[k] from y[-1] = 0."""
     from scipy.signal import lfilter  # takes longer to import than to read a finding that was kept
 
-    found: Array = lfilter([1.0], [1.0, -keep], added)
-    return found
+    summed: Array = lfilter([1.0], [1.0, -keep], added)
+    return summed
 
 
 def expected_bare(setting: Refinement, dt: float) -> float:
@@ -131,12 +131,12 @@ def expected_bare(setting: Refinement, dt: float) -> float:
 def counts(setting: Refinement) -> dict[str, Array]:
     """Triggers by path and dt, (PATHS, dt): bare threshold, automaton, automaton at the scenario's own noise."""
     trigger = setting.trigger
-    found = {name: np.zeros((PATHS, len(setting.dt_s))) for name in SERIES}
+    triggered = {name: np.zeros((PATHS, len(setting.dt_s))) for name in SERIES}
     for i in range(PATHS):
         for j, (dt, unit) in enumerate(zip(setting.dt_s, path(setting, i), strict=True)):
             above = unit >= 0.0
             # the bare threshold has no memory: it triggers at the start, if above, and at every rise
-            found["bare"][i, j] = above[0] + np.count_nonzero(above[1:] & ~above[:-1])
+            triggered["bare"][i, j] = above[0] + np.count_nonzero(above[1:] & ~above[:-1])
             for name, noise in zip(SERIES[1:], (setting.noise_m_sqrt_s, setting.own_noise_m_sqrt_s), strict=True):
-                found[name][i, j] = len(triggers(trigger, trigger.zeta + noise * unit, dt))
-    return found
+                triggered[name][i, j] = len(triggers(trigger, trigger.zeta + noise * unit, dt))
+    return triggered

@@ -107,13 +107,13 @@ class TheoremClaim(ModelClaim):
 
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Check the hypotheses, and whether Coq has checked the theorems as they stand here."""
-        found = self.hypotheses(inputs)
-        broken = [hypothesis for hypothesis in found if not hypothesis.holds]
-        named = [hypothesis for hypothesis in found if hypothesis.hypothesis == self.margin_of]
+        hypotheses = self.hypotheses(inputs)
+        broken = [hypothesis for hypothesis in hypotheses if not hypothesis.holds]
+        named = [hypothesis for hypothesis in hypotheses if hypothesis.hypothesis == self.margin_of]
         shown = broken[0] if broken else min(named, key=lambda hypothesis: hypothesis.margin)
-        evidence = self.evidence(inputs, **grounds(self.theorems, found))
+        evidence = self.evidence(inputs, **grounds(self.theorems, hypotheses))
         finding = Finding(
-            "proved", shown.margin, shown.unit, evidence=evidence, quantity=shown.hypothesis, exercised=len(found)
+            "proved", shown.margin, shown.unit, evidence=evidence, quantity=shown.hypothesis, exercised=len(hypotheses)
         )
         against = self.counterexample(inputs, shown) if broken else None
         if against is not None:

@@ -27,20 +27,20 @@ def broken_rules(folder: Path, traces: Mapping[str, Trace]) -> tuple[dict[str, A
     # The distances are computed here in exact arithmetic, so an unsafe run cannot be called proved. Whether Coq has
     # accepted a file is taken from the record: `airground check --coq` asks Coq again.
     # traces: of the report's runs, by name; in the folder `trace` beside `folder`.
-    found: dict[str, Any] = json.loads(files.read_text(folder / FOUND))
-    return found, [*_broken(folder, found, traces)]
+    record: dict[str, Any] = json.loads(files.read_text(folder / FOUND))
+    return record, [*_broken(folder, record, traces)]
 
 
-def _broken(folder: Path, found: Mapping[str, Any], traces: Mapping[str, Trace]) -> Iterator[Broken]:
+def _broken(folder: Path, record: Mapping[str, Any], traces: Mapping[str, Trace]) -> Iterator[Broken]:
     texts: dict[str, str] = {}
-    yield from _unless(FOUND, SCHEMA, found["schema"])
-    yield from _unless(f"keys of {FOUND}", ["coq", "runs", "schema", "theory"], sorted(found))
-    yield from _unless("theory", {name: digest(FOLDER / name) for name in closure(CHECKERS)}, found["theory"])
-    yield from _unless(FOUND, [], sorted({*found["runs"]} - {*traces}))
+    yield from _unless(FOUND, SCHEMA, record["schema"])
+    yield from _unless(f"keys of {FOUND}", ["coq", "runs", "schema", "theory"], sorted(record))
+    yield from _unless("theory", {name: digest(FOLDER / name) for name in closure(CHECKERS)}, record["theory"])
+    yield from _unless(FOUND, [], sorted({*record["runs"]} - {*traces}))
     for name, trace in traces.items():
-        if name not in found["runs"]:
+        if name not in record["runs"]:
             continue
-        exact, entry = recorded(trace), found["runs"][name]
+        exact, entry = recorded(trace), record["runs"][name]
         lawfully = recorded(trace, steered=True) if exact.off_m else exact
         table, near = entries(lawfully), too_near(exact)
         alone = not entry["distances"]["proved"] or lawfully is not exact

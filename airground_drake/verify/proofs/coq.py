@@ -45,9 +45,9 @@ def version() -> str:
 
 def screen(text: str, name: str) -> None:
     """Refuse a file that assumes something, or turns off a check of Coq."""
-    found = UNSOUND.search(without_comments(text))
-    if found:
-        raise CoqError(f"{name} has the word {found[0]!r}: a theory may assume nothing")
+    unsound = UNSOUND.search(without_comments(text))
+    if unsound:
+        raise CoqError(f"{name} has the word {unsound[0]!r}: a theory may assume nothing")
 
 
 def without_comments(text: str) -> str:
@@ -117,9 +117,9 @@ def check_again(modules: Sequence[str], folder: Path, limit_s: float = LIMIT_S) 
     axioms = parts.pop("Axioms", None)
     if axioms is None or parts.pop("Theory", "") != "Set is predicative" or len(parts) != 3:
         raise CoqError("coqchk does not say what the theories rest on")
-    for part, found in parts.items():
-        if found != "<none>":
-            raise CoqError(f"coqchk: {part}: {found}")
+    for part, answer in parts.items():
+        if answer != "<none>":
+            raise CoqError(f"coqchk: {part}: {answer}")
     for axiom in [] if axioms == "<none>" else axioms.split():
         if not any(axiom.endswith("." + allowed) for allowed in ALLOWED_AXIOMS):
             raise CoqError(f"coqchk finds the axiom {axiom}, which is not allowed")

@@ -101,7 +101,7 @@ class Recorded:
             *self.times,
             *(demand.safe_m for demand in self.demands),
             *(axis for places in self.places.values() for place in places for axis in place),
-            *(axis for each in chain(*self.sets.values()) for axis in (each.base, each.top, *chain(*each.outline))),
+            *(axis for prism in chain(*self.sets.values()) for axis in (prism.base, prism.top, *chain(*prism.outline))),
         )
         return lcm(*(number.denominator for number in numbers))
 
@@ -109,11 +109,11 @@ class Recorded:
     def rows(self) -> Mapping[str, Sequence[Vector]]:
         """Where each body is at each row, in whole numbers of metres / unit."""
         unit, count = self.unit, len(self.times)
-        found = {
+        whole = {
             name: [(int(x * unit), int(y * unit), int(z * unit)) for x, y, z in places]
             for name, places in self.places.items()
         }
-        return {name: rows * count if len(rows) == 1 else rows for name, rows in found.items()}
+        return {name: rows * count if len(rows) == 1 else rows for name, rows in whole.items()}
 
     def way(self, demand: Demand) -> list[Vector]:
         """Where the first body of a pair is at each row as seen from the second one, in metres / unit."""
@@ -122,7 +122,7 @@ class Recorded:
 
     def prisms(self, demand: Demand) -> list[Prism]:
         """The sets that are the second body of a pair, in metres / unit; for a ball its centre."""
-        return [each.in_parts(self.unit) for each in self.sets[demand.sets]] if demand.core else [Prism(((0, 0),))]
+        return [part.in_parts(self.unit) for part in self.sets[demand.sets]] if demand.core else [Prism(((0, 0),))]
 
 
 def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
@@ -138,8 +138,8 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
     spelled = _spelled(list(places))
     asked = demands_of(trace, steered=steered)
     wanted = [
-        each._replace(first=spelled[each.first], second=spelled[each.second], called=(each.first, each.second))
-        for each in asked
+        pair._replace(first=spelled[pair.first], second=spelled[pair.second], called=(pair.first, pair.second))
+        for pair in asked
     ]
     return Recorded(
         name=f"run_{trace.run}{'_steered' if steered else ''}",
@@ -148,7 +148,7 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
         demands=tuple(wanted),
         gain=min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1)),
         off_m={spelled[name]: off for name, off in off_m(trace, steered=steered).items()},
-        sets={each.sets: _sets(barriers[each.called[1]], each.core) for each in wanted if each.core},
+        sets={demand.sets: _sets(barriers[demand.called[1]], demand.core) for demand in wanted if demand.core},
     )
 
 
@@ -194,27 +194,27 @@ def off_m(trace: Trace, *, steered: bool = False) -> dict[str, Fraction]:
 def demands_of(trace: Trace, *, steered: bool = False) -> list[Demand]:
     """The demands on a run, with room for what its bodies may be off, or for what the law adds."""
     lines = off_m(trace)
-    found = []
-    for each in demands(trace.scenario):
-        names = [name for name in (each.first, each.second) if name in lines]
+    demanded = []
+    for demand in demands(trace.scenario):
+        names = [name for name in (demand.first, demand.second) if name in lines]
         if steered:
-            room = slack.law_m(trace, each.body_m, each.first, each.second) - each.body_m
+            room = slack.law_m(trace, demand.body_m, demand.first, demand.second) - demand.body_m
         else:
             room = sum((lines[name] for name in names), Fraction(0))
-        found.append(each._replace(room_m=room, late=any(slack.is_late(trace, name) for name in names)))
-    return found
+        demanded.append(demand._replace(room_m=room, late=any(slack.is_late(trace, name) for name in names)))
+    return demanded
 
 
 def demands(scenario: Scenario) -> list[Demand]:
     """Who is to keep which distance from whom: each robot from each obstacle, and each two robots."""
     balls = {name for name, obstacle in scenario.barriers.items() if convex_parts(obstacle) is None}
-    found = []
+    demanded = []
     for pair in apart(scenario):
         is_point = pair.second in balls or pair.second in scenario.robots
         core = "" if is_point else "solid" if pair.first == scenario.uav.name else "ground"
         radii = sum(map(decimal, pair.radii_m), Fraction(0))
-        found.append(Demand(pair.first, pair.second, decimal(pair.required_m), radii, core, pair.kind == MOVING))
-    return found
+        demanded.append(Demand(pair.first, pair.second, decimal(pair.required_m), radii, core, pair.kind == MOVING))
+    return demanded
 
 
 def _rounded(place: Sequence[float]) -> Place:
@@ -281,7 +281,7 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
         run=run.name, interval=interval, start=ratio(run.times[0]), end=ratio(run.times[-1])
     )  # fmt: skip
     together = _theorem(f"{run.name}_keeps_its_distances", f"forall t, {interval} ->", _grouped(run.demands, claims))
-    proofs = _grouped(run.demands, [f"({each.lemma} t T)" for each in run.demands])
+    proofs = _grouped(run.demands, [f"({demand.lemma} t T)" for demand in run.demands])
     proof = all_of([all_of(group) for group in proofs])
     bodies, theorem = "", f"{run.name}_keeps_its_distances"
     if run.off_m:
@@ -335,7 +335,7 @@ def _bodies(run: Recorded, interval: str) -> str:
         f"Proof. decide_bodies {demand.first} {demand.second} {demand.lemma}. Qed.\n\n"
         for demand, claim in zip(run.demands, claims, strict=True)
     )
-    proofs = _grouped(run.demands, [f"(bodies_{each.lemma} t T)" for each in run.demands])
+    proofs = _grouped(run.demands, [f"(bodies_{demand.lemma} t T)" for demand in run.demands])
     together = _theorem(
         f"{run.name}_bodies_keep_their_distances", f"forall t, {interval} ->", _grouped(run.demands, claims)
     )
@@ -385,7 +385,7 @@ def without_vectors(text: str) -> str:
 
 def _grouped(demands: Sequence[Demand], texts: Sequence[str]) -> list[list[str]]:
     """One text per pair, by the first body: Coq takes a time quadratic in the length of each conjunction."""
-    pairs = groupby(zip(demands, texts, strict=True), key=lambda each: each[0].first)
+    pairs = groupby(zip(demands, texts, strict=True), key=lambda both: both[0].first)
     return [[text for _, text in group] for _, group in pairs]
 
 
@@ -411,8 +411,8 @@ def data(run: Recorded) -> str:
             out.append(f"Definition {name}_places := Track {stride(rows):#x} [\n{listed}].\n")
     out += [f"Definition {name} := {k}%nat.\n" for k, name in enumerate(run.places)]
     for name, sets in run.sets.items():
-        corners = ("; ".join(map(_point, each.in_parts(unit).corners)) for each in sets)
-        listed = ";\n".join(f"[{each}]" for each in corners)
+        corners = ("; ".join(map(_point, prism.in_parts(unit).corners)) for prism in sets)
+        listed = ";\n".join(f"[{outline}]" for outline in corners)
         out.append(f"(** Corners of convex sets, from where their body is. *)\nDefinition {name} := [\n{listed}].\n")
     times = ";\n".join(_whole(int(time * unit)) for time in run.times)
     bodies = "; ".join(f"{name}_places" for name in run.places)

@@ -33,8 +33,8 @@ class RereadError(NamedTuple):
 def compare(text: str, trace: Trace) -> RereadError:
     """Compare the file about distances with the run that it should be about."""
     spelled, error = _compare_positions(text, trace)
-    named = [each._replace(first=spelled[each.first], second=spelled[each.second]) for each in demands_of(trace)]
-    wanted = [(each.first, each.second, each.sets if each.core else "", each.safe_m) for each in named]
+    named = [pair._replace(first=spelled[pair.first], second=spelled[pair.second]) for pair in demands_of(trace)]
+    wanted = [(pair.first, pair.second, pair.sets if pair.core else "", pair.safe_m) for pair in named]
     _compare_statement(f"run_{trace.run}", text, trace, wanted)
     if any(trace.is_apart(name) for name in trace.robots):
         _compare_bodies(f"run_{trace.run}", text, trace, named)
@@ -67,10 +67,10 @@ def _compare_positions(text: str, trace: Trace, *, steered: bool = False) -> tup
     off = list[Fraction]()
     for body, places in zip(bodies, recorded.values(), strict=True):
         said = _coordinates(body, text, len(trace.t), int(unit, 0), len(places))
-        off += [abs(one - Fraction(axis)) for one, axis in zip(said, chain(*places), strict=True)]
+        off += [abs(number - Fraction(axis)) for number, axis in zip(said, chain(*places), strict=True)]
     spelled = dict(zip(recorded, bodies, strict=True))
     asked = demands(trace.scenario)
-    for name, core in dict.fromkeys((each.second, each.core) for each in asked if each.core):
+    for name, core in dict.fromkeys((demand.second, demand.core) for demand in asked if demand.core):
         top = trace.scenario.barriers[name].height_m if core == "solid" else 0.0
         parts = [[(*corner, z) for z in dict.fromkeys((0.0, top)) for corner in part] for part in shapes[name] or []]
         off += _off_corners(f"{spelled[name]}_{core}", text, int(unit, 0), parts)
@@ -79,11 +79,11 @@ def _compare_positions(text: str, trace: Trace, *, steered: bool = False) -> tup
     room = off_m(trace, steered=steered)
     if room and f"Definition {run}_off (i : nat) : R := nth i" in text:
         [listed_m] = _parts(rf"^Definition {run}_off \(i : nat\) : R := nth i \[(.*?)\] 0\.$", text)
-        if [_value(each) for each in listed_m.split("; ")] != [room.get(name, Fraction(0)) for name in recorded]:
+        if [_value(value) for value in listed_m.split("; ")] != [room.get(name, Fraction(0)) for name in recorded]:
             raise ReadbackError(f"{run}: bodies may be off the straight lines by other lengths than their plants say")
     elif room:
         raise ReadbackError(f"{run}: how far bodies may be off the straight lines is missing")
-    return spelled, RereadError(sum(each > 0 for each in off), float(max(off)))
+    return spelled, RereadError(sum(distance > 0 for distance in off), float(max(off)))
 
 
 def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> list[Fraction]:
@@ -98,11 +98,11 @@ def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> lis
 def _off_corners(sets: str, text: str, unit: int, parts: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
     """By how much the corners of convex sets in the file differ from those of the scenario, m."""
     [what] = _parts(rf"^Definition {sets} := \[\n(.*?)\]\.$", text)
-    said = [_points(each, unit) for each in what.split(";\n")]
-    if [len(each) for each in said] != [len(part) for part in parts]:
+    said = [_points(part, unit) for part in what.split(";\n")]
+    if [len(part) for part in said] != [len(part) for part in parts]:
         raise ReadbackError(f"{sets}: the sets in the file have other corners than the shape in the scenario")
     pairs = zip(chain(*chain(*said)), chain(*chain(*parts)), strict=True)
-    return [abs(one - Fraction(axis)) for one, axis in pairs]
+    return [abs(number - Fraction(axis)) for number, axis in pairs]
 
 
 def _points(text: str, unit: int) -> list[list[Fraction]]:
@@ -122,8 +122,8 @@ def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple
     balls = rf"{number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)"
     claim = re.compile(rf"{balls}|clear {run} (\w+) (\w+) (\w+) {number} t")
     claims = [
-        (one or first, other or second, sets, _value(apart or safe))
-        for apart, one, other, first, second, sets, safe in claim.findall(body)
+        (own or first, other or second, sets, _value(apart or safe))
+        for apart, own, other, first, second, sets, safe in claim.findall(body)
     ]
     between = claim.sub("", body)  # has to be conjunctions and their parentheses alone
     if claims != list(wanted) or re.sub(r"[\s()]", "", between) != "/\\" * (len(claims) - 1):
@@ -143,10 +143,10 @@ def _compare_bodies(run: str, text: str, trace: Trace, wanted: Sequence[Demand])
     )
     claim = re.compile(rf"{sets}|{balls}")
     claims = [
-        (one or first, other or second, of, _value(least or apart))
-        for of, least, one, other, apart, first, second in claim.findall(body)
+        (own or first, other or second, of, _value(least or apart))
+        for of, least, own, other, apart, first, second in claim.findall(body)
     ]
-    expected = [(each.first, each.second, each.sets if each.core else "", each.body_m) for each in wanted]
+    expected = [(demand.first, demand.second, demand.sets if demand.core else "", demand.body_m) for demand in wanted]
     between = re.sub(r"[\s()]", "", claim.sub("", body))
     whole = [_value(start), _value(end)] == [Fraction(trace.t[0]), Fraction(trace.t[-1])]
     near = f"Hypothesis near_lines : forall i t, norm (sub (x i t) (position {run} i t)) <= {run}_off i."
@@ -160,7 +160,7 @@ def _value(text: str) -> Fraction:
 
 def _parts(pattern: str, text: str) -> tuple[str, ...]:
     """The groups of the one place that a pattern matches."""
-    found = list(re.finditer(pattern, text, re.MULTILINE | re.DOTALL))
-    if len(found) != 1:
-        raise ReadbackError(f"{pattern.split(' :')[0].lstrip('^')} is in the file {len(found)} times; wanted: once")
-    return found[0].groups()
+    matches = list(re.finditer(pattern, text, re.MULTILINE | re.DOTALL))
+    if len(matches) != 1:
+        raise ReadbackError(f"{pattern.split(' :')[0].lstrip('^')} is in the file {len(matches)} times; wanted: once")
+    return matches[0].groups()

@@ -66,8 +66,8 @@ def read_record(folder: Path = FOLDER) -> dict[str, Any] | None:
 
 def _doubt(record: Mapping[str, Any], names: tuple[str, ...], theory: Mapping[str, str]) -> str:
     """Why the theorems are not covered by the record; empty if they are."""
-    for file, found in theory.items():
-        if record["sha256"].get(file) != found:
+    for file, sha256 in theory.items():
+        if record["sha256"].get(file) != sha256:
             return f"{file} differs from its record: run `airground prove`"
     for name in names:
         if name not in record["axioms"]:
@@ -92,7 +92,7 @@ def closure(names: Iterable[str], folder: Path = FOLDER) -> list[str]:
     """Theories and everything that they require, in an order in which Coq can compile them."""
     order: list[str] = []
     for name in names:
-        order += [each for each in (*closure(required(folder / name), folder), name) if each not in order]
+        order += [file for file in (*closure(required(folder / name), folder), name) if file not in order]
     return order
 
 

@@ -91,9 +91,9 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
         text = distances_file(exact)
     rounded = readback.compare(text, run)
     distances = decide(place, exact, f"{exact.name}.v", text, f"{exact.name}_keeps_its_distances", limit_s)
-    if distances.refused and (found := too_near(exact)):
-        words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, found))}"
-        distances = replace(distances, why=words, too_near=found)
+    if distances.refused and (near := too_near(exact)):
+        words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, near))}"
+        distances = replace(distances, why=words, too_near=near)
     lawfully = recorded(run, steered=True) if exact.off_m else exact
     table = entries(lawfully)
     alone = not distances.proved or lawfully is not exact
@@ -105,7 +105,9 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
 
 def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: str, limit_s: float) -> CoqReply:
     """Have Coq prove the table of a run, from its file; it is wanted of all pairs and periods."""
-    theorem, name, gaps = f"{run.name}_obeys_the_law", f"{run.name}_law.v", missed(run, table)
+    theorem = f"{run.name}_obeys_the_law"
+    name = f"{run.name}_law.v"
+    gaps = missed(run, table)
     if not table:
         why = "no pair obeys it in any period" if gaps else "its table has no pair: see docs/verification.md"
         return CoqReply(False, theorem, name, why, missed=gaps)
@@ -169,7 +171,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
     for run in runs.values():
         with _usable(run):
             refuse_unknown(run)
-    found: list[Proved] = []
+    answers: list[Proved] = []
     with workshop(limit_s) as place:
         for name, run in runs.items():
             distances, law, rounded = prove(place, run, limit_s)
@@ -180,9 +182,9 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
             meta = files.sha256(files.read_bytes(report / "trace" / name / "meta.json"))
             asked = demands_of(run)
             counts = len(asked), len(lawful(asked)), len(run.t)
-            found.append(Proved(name, expects_kept(run), *counts, distances, law, rounded, meta))
-            yield found[-1]
-        files.write_json(report / PLACE / FOUND, document(place, found))
+            answers.append(Proved(name, expects_kept(run), *counts, distances, law, rounded, meta))
+            yield answers[-1]
+        files.write_json(report / PLACE / FOUND, document(place, answers))
 
 
 def expects_kept(run: Trace) -> bool:
@@ -191,7 +193,7 @@ def expects_kept(run: Trace) -> bool:
     return declared(expected) != NOTHING and "refuted" not in expected
 
 
-def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:
+def document(place: Workshop, answers: Sequence[Proved]) -> dict[str, Any]:
     """What was found, as strict JSON."""
     return {
         "schema": SCHEMA,
@@ -209,7 +211,7 @@ def document(place: Workshop, found: Sequence[Proved]) -> dict[str, Any]:
                 "distances": _entry(proved.distances),
                 "law": _entry(proved.law),
             }
-            for proved in found
+            for proved in answers
         },
     }
 
@@ -223,9 +225,9 @@ def _entry(answer: CoqReply) -> dict[str, Any]:
     if answer.proved:
         return entry | {"axioms": list(answer.axioms), "seconds": round(answer.seconds, 3)}
     near = [
-        {"first": one.demand.called[0], "second": one.demand.called[1], "safe_distance_m": float(one.demand.required_m)}
-        | {"least_m": one.least_m, "short_m": one.short_m, "t_s": one.t_s}
-        for one in answer.too_near
+        {"first": gap.demand.called[0], "second": gap.demand.called[1], "safe_distance_m": float(gap.demand.required_m)}
+        | {"least_m": gap.least_m, "short_m": gap.short_m, "t_s": gap.t_s}
+        for gap in answer.too_near
     ]
     return entry | {"why": answer.why} | ({"too_near": near} if near else {})
 

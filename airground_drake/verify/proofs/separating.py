@@ -54,7 +54,7 @@ class Prism(NamedTuple):
     def nearest(self, points: Array) -> Array:
         """The points of the set that are nearest to others, in floating point; both (k, 3)."""
         outline = np.array(self.outline, dtype=np.float64)
-        found = points.copy()
+        nearest = points.copy()
         best = np.full(len(points), np.inf)
         outside = np.full(len(points), len(outline) < 3)
         for begin, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
@@ -62,12 +62,12 @@ class Prism(NamedTuple):
             along = np.clip(to @ side / max(side @ side, np.finfo(float).tiny), 0.0, 1.0)
             place = begin + along[:, None] * side
             apart = np.linalg.norm(points[:, :2] - place, axis=1)
-            found[apart < best, :2] = place[apart < best]
+            nearest[apart < best, :2] = place[apart < best]
             best = np.minimum(best, apart)
             outside |= side[0] * to[:, 1] - side[1] * to[:, 0] < 0.0
-        found[~outside, :2] = points[~outside, :2]
-        found[:, 2] = np.clip(points[:, 2], self.base, self.top)
-        return found
+        nearest[~outside, :2] = points[~outside, :2]
+        nearest[:, 2] = np.clip(points[:, 2], self.base, self.top)
+        return nearest
 
 
 def separating(prisms: Sequence[Prism], way: Sequence[Vector], safe: int) -> list[list[Stretch]]:
@@ -80,7 +80,7 @@ def separating(prisms: Sequence[Prism], way: Sequence[Vector], safe: int) -> lis
 
 
 def _stretches(prism: Prism, way: Sequence[Vector], search: _Search) -> list[Stretch]:
-    found = list[Stretch]()
+    stretches = list[Stretch]()
     row, last = 0, len(way) - 1
     while row < last:
         end, vector = search.longest(row)
@@ -88,17 +88,20 @@ def _stretches(prism: Prism, way: Sequence[Vector], search: _Search) -> list[Str
             _, vector = apart(prism, way[row], way[row + 1])
             end = search.end(vector, row)
         if end == row:
-            return [*found, (last - row, vector)]
-        found.append((end - row, vector))
+            return [*stretches, (last - row, vector)]
+        stretches.append((end - row, vector))
         row = end
-    return found
+    return stretches
 
 
 class _Search:
     """The rows of a way that a vector serves."""
 
     def __init__(self, prism: Prism, way: Sequence[Vector], rows: Array, safe: int) -> None:
-        self._corners, self._way, self._rows, self._safe = prism.corners, way, rows, safe
+        self._corners = prism.corners
+        self._way = way
+        self._rows = rows
+        self._safe = safe
         offsets = self._rows - prism.nearest(self._rows)
         self._apart = np.linalg.norm(offsets, axis=1)
         self._away = offsets / np.maximum(self._apart, np.finfo(float).tiny)[:, None]
@@ -107,7 +110,8 @@ class _Search:
 
     def longest(self, row: int) -> tuple[int, Vector]:
         """The last row of the longest stretch found that begins at a row, and its vector."""
-        last, nearest = len(self._way) - 1, row + int(np.argmin(self._apart[row:]))
+        last = len(self._way) - 1
+        nearest = row + int(np.argmin(self._apart[row:]))
         best, before = (row, (0, 0, 0)), -1
         short = [normal for normal in self._normals if max(map(abs, normal)) <= SCALES[0]]
         tried: Iterator[Vector] = chain(short, self._rounded(self._away[[nearest, row]]), self._normals)

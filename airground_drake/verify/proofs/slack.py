@@ -33,15 +33,15 @@ def bounds(trace: Trace, robot: str) -> Bounds:
 
 def off_lines_m(trace: Trace, robot: str) -> Fraction:
     """How far a robot's body may be off the straight lines between its recorded places, m."""
-    found = bounds(trace, robot)
-    lagging = found.speed_m_s * trace.scenario.control.period_s**2 / (4.0 * found.lag_s) if found.lag_s else 0.0
-    return Fraction(found.dip_m) + Fraction(lagging)
+    limits = bounds(trace, robot)
+    lagging = limits.speed_m_s * trace.scenario.control.period_s**2 / (4.0 * limits.lag_s) if limits.lag_s else 0.0
+    return Fraction(limits.dip_m) + Fraction(lagging)
 
 
 def off_steered_m(trace: Trace, robot: str) -> Fraction:
     """How far a robot's body may be off the straight lines of the point that the law steers, m."""
-    found = bounds(trace, robot)
-    room = Fraction(found.cover_m) + Fraction(found.dip_m)
+    limits = bounds(trace, robot)
+    room = Fraction(limits.cover_m) + Fraction(limits.dip_m)
     return max(room - ROUNDED_M, Fraction(0))
 
 
@@ -54,6 +54,6 @@ def law_m(trace: Trace, distance_m: Fraction, first: str, second: str) -> Fracti
     """The distance that the law keeps between two steered points, or one and a set at rest, m."""
     robots, control = trace.scenario.robots, trace.scenario.control
     both = [trace.plant(name).bounds(robots[name].max_speed_m_s) for name in (first, second) if name in robots]
-    if all(each.exact for each in both):
+    if all(plant.exact for plant in both):
         return distance_m
     return Fraction(float(law_distance(float(distance_m), *both, gain=control.avoidance_gain_1_s)))

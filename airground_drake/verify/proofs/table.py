@@ -47,13 +47,13 @@ def entries(run: Recorded) -> list[Entry]:
 def missed(run: Recorded, table: Sequence[Entry]) -> list[Missed]:
     """The pairs with periods that no entry is about."""
     last = len(run.times) - 1
-    found = []
+    pairs = []
     for demand in lawful(run.demands):
-        ends = [end for each in table if each.demand == demand for end in (each.first, each.first + each.many)]
+        ends = [end for entry in table if entry.demand == demand for end in (entry.first, entry.first + entry.many)]
         gaps = [(begin, end) for begin, end in zip([0, *ends[1::2]], [*ends[::2], last], strict=True) if begin < end]
         if gaps:
-            found.append(Missed(demand, float(run.times[gaps[0][0]]), float(run.times[gaps[-1][1]])))
-    return found
+            pairs.append(Missed(demand, float(run.times[gaps[0][0]]), float(run.times[gaps[-1][1]])))
+    return pairs
 
 
 def _windows(run: Recorded, demand: Demand) -> Iterator[tuple[int, int]]:

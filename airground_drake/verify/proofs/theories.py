@@ -43,19 +43,19 @@ def check(source: Path = FOLDER, limit_s: float = coq.LIMIT_S) -> Checked:
     return Checked(version, sha256, axioms, compiled - started, done - compiled)
 
 
-def differences(found: Checked, source: Path = FOLDER) -> list[str]:
+def differences(checked: Checked, source: Path = FOLDER) -> list[str]:
     """Differences from the record, a line each. Another version of Coq does not count."""
     record = read_record(source)
     if record is None:
         return [f"{RECORD} cannot be read"]
     return [
         f"{name} differs from its record"
-        for part, now in (("sha256", found.sha256), ("axioms", found.axioms))
+        for part, now in (("sha256", checked.sha256), ("axioms", checked.axioms))
         for name in sorted({*record[part], *now})
         if record[part].get(name) != now.get(name)
     ]
 
 
-def write_record(found: Checked, source: Path = FOLDER) -> Path:
-    files.write_json(source / RECORD, found.record)
+def write_record(checked: Checked, source: Path = FOLDER) -> Path:
+    files.write_json(source / RECORD, checked.record)
     return source / RECORD

@@ -33,7 +33,7 @@ class TooNear:
 
 def too_near(run: Recorded) -> list[TooNear]:
     """All pairs that do not keep their distance at all times of the run, in the order of its demands."""
-    return [found for demand in run.demands if (found := _worst(run, demand)) is not None]
+    return [worst for demand in run.demands if (worst := _worst(run, demand)) is not None]
 
 
 def _worst(run: Recorded, demand: Demand) -> TooNear | None:
@@ -59,8 +59,8 @@ def _near(prism: Prism, rows: Array, reach: float) -> list[int]:
     """The rows, (k, 3), from which the next step may come nearer to a set than `reach`; all in parts."""
     steps = np.linalg.norm(np.diff(rows, axis=0), axis=1)
     apart = np.linalg.norm(rows - prism.nearest(rows), axis=1)[:-1]
-    found: list[int] = np.flatnonzero(apart - steps < reach).tolist()
-    return found
+    rows_near: list[int] = np.flatnonzero(apart - steps < reach).tolist()
+    return rows_near
 
 
 def _when(prism: Prism, begin: Vector, end: Vector) -> Fraction:

@@ -35,16 +35,19 @@ def below_avoidance(trace: Trace) -> tuple[int, int]:
 
 
 def _of_ugv(trace: Trace, ugv: str) -> list[Acceptance]:
-    gate, found, table = trace.scenario.gatekeeper, list[Acceptance](), trace.decisions
+    gate = trace.scenario.gatekeeper
+    accepted = list[Acceptance]()
+    table = trace.decisions
     mine = table[table["robot"] == ugv].sort_values("t_s", kind="stable")
     given = zip(*(mine[name].tolist() for name in ("number", "decision", "t_s", "new")), strict=True)
     answers = [(*key, [(t, len(new)) for *_, t, new in rows]) for key, rows in groupby(given, lambda row: row[:2])]
     for (number, said, rows), following in zip_longest(answers, answers[1:]):
         if said == "accept":
-            on, back = proposal_of(trace, number), following is not None and following[0] == number
+            on = proposal_of(trace, number)
+            back = following is not None and following[0] == number
             last = following[2][:1] if back else []
             end_s = last[0][0] if back else min(rows[-1][0] + gate.period_s, float(trace.t[-1]))
             until_s = min(float(on.times_s[-1]), rows[0][0] + gate.longest_s)
             news_s = tuple(t for t, new in [*rows[1:], *last] if new)
-            found.append(Acceptance(on, rows[0][0], end_s, until_s, back, news_s))
-    return found
+            accepted.append(Acceptance(on, rows[0][0], end_s, until_s, back, news_s))
+    return accepted

@@ -55,13 +55,16 @@ def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Arr
 
 def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
     """The inequalities of a robot at the control samples of its run, beside all that is within sensing range."""
-    samples, parts, control = trace.sample_rows, parts_of(trace), trace.scenario.control
+    samples = trace.sample_rows
+    parts = parts_of(trace)
+    control = trace.scenario.control
     planar, pairs = is_planar(trace, robot), pairs_beside(trace, robot)
 
     def place(body: str) -> Array:
         return trace.as_seen(robot, body) if as_seen else trace.position(body)[samples]
 
-    own, others = place(robot), [name for name in trace.robots if name != robot]
+    own = place(robot)
+    others = [name for name in trace.robots if name != robot]
     near = contacts(trace, own, samples, control.sensing_range_m, planar=planar)
     offset = own[:, None] - np.stack([place(name) for name in others], axis=1)
     apart = np.sqrt(np.square(offset).sum(axis=2))

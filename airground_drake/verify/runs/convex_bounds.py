@@ -39,14 +39,14 @@ def enclose(rows: Sequence[DecisionRecord]) -> list[Enclosure]:
     # Where costs are tiny, the solver's omega* is not accurate enough, and the minimiser of q is used, too.
     if not rows:
         return []
-    found = []
+    enclosures = []
     for row, omega, solved in zip(rows, *_solve(rows), strict=True):
         multiplier = solved * row.scale if row.slack_weight > 0.0 else 0.0 * solved
         bounds = _bounds(row, omega, multiplier)
         if bounds.upper - bounds.lower > WIDE * row.scale:
             bounds &= _bounds(row, _minimiser(row, multiplier), multiplier)
-        found.append(bounds)
-    return found
+        enclosures.append(bounds)
+    return enclosures
 
 
 def _bounds(row: DecisionRecord, omega: Array, multiplier: Array) -> Enclosure:

@@ -38,8 +38,12 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     #
     # Every robot avoids all convex parts of the barriers at rest, then all other robots in team order, then the parts
     # of the barriers that move.
-    scenario, robots, parts = trace.scenario, trace.robots, parts_of(trace)
-    control, barriers, everybody = scenario.control, scenario.barriers, np.arange(len(robots))
+    scenario = trace.scenario
+    robots = trace.robots
+    parts = parts_of(trace)
+    control = scenario.control
+    barriers = scenario.barriers
+    everybody = np.arange(len(robots))
     still, moving = _numbers(trace)
     m = len(still)
     number = {name: k for k, name in enumerate([*barriers, *robots])}
@@ -57,10 +61,10 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     bodies = np.unique(parts.owner[moving], return_inverse=True)[1]
     carrier = np.concatenate([everybody, len(robots) + bodies])
     with_uav = np.array([name == scenario.uav.name for name in robots])
-    found = {}
+    wanted = {}
     for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
         beside = np.array([np.delete(np.arange(len(column)), m + i) for i in team])
-        found[name] = {
+        wanted[name] = {
             "members": team,
             "outlines": at_rest,
             "others": carrier[beside[:, m:] - m].ravel(),
@@ -74,12 +78,12 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             "sensing_range_m": control.sensing_range_m,
         }
         if len(moving):
-            found[name]["moving_outlines"] = that_move
+            wanted[name]["moving_outlines"] = that_move
     of_run = scenario.runs[trace.run]
-    found["ugv_controller"]["composition"] = of_run.composition
+    wanted["ugv_controller"]["composition"] = of_run.composition
     if of_run.method != NO_INTERVENTION:
-        found["ugv_controller"]["intervention_on_top"] = of_run.method in ON_TOP
-    return found
+        wanted["ugv_controller"]["intervention_on_top"] = of_run.method in ON_TOP
+    return wanted
 
 
 def _numbers(trace: Trace) -> tuple[Indices, Indices]:
@@ -92,10 +96,12 @@ def outlines_of(trace: Trace) -> Iterator[Array]:
     """The numbers of the outline of each convex part of the barriers, but for the circle round its corners."""
     parts, pairs = parts_of(trace), pairs_beside(trace, trace.robots[0])
     for k, number in enumerate(parts.owner.tolist()):
-        barrier, core = trace.scenario.barriers[parts.names[number]], parts.cores.take(k)
+        barrier = trace.scenario.barriers[parts.names[number]]
+        core = parts.cores.take(k)
         corners = list(dict.fromkeys(map(tuple, core.corners.tolist())))
         heights = [float(core.base), float(core.top), float(len(corners))]
-        gap, speed = pairs[parts.names[number]].required_m, barrier.expected_speed_m_s
+        gap = pairs[parts.names[number]].required_m
+        speed = barrier.expected_speed_m_s
         yield np.array([gap, barrier.radius_m, speed, *heights, *(x for corner in corners for x in corner)])
 
 
@@ -105,12 +111,12 @@ def _without_circles(numbers: Sequence[float]) -> Array:
         rows = unpacked(numbers)
     except ValueError:
         return np.array(numbers)
-    found = [np.empty(0)]
+    kept = [np.empty(0)]
     for row in rows:
         corners = row[CORNERS : CORNERS + 2 * int(row[COUNT])]
         held = np.hypot(*(corners.reshape(-1, 2) - row[MIDDLE:EXTENT]).T).max() <= row[EXTENT]
-        found.append(np.where(held, np.append(row[:MIDDLE], corners), np.nan))
-    return np.concatenate(found)
+        kept.append(np.where(held, np.append(row[:MIDDLE], corners), np.nan))
+    return np.concatenate(kept)
 
 
 def differences(trace: Trace) -> Iterator[dict[str, Any]]:
@@ -144,7 +150,8 @@ def _place(trace: Trace, wanted: dict[str, Any], parameter: str, k: int) -> dict
         robot, column = divmod(k, length)
         others = wanted["others"].reshape(len(members), -1)[robot]
         still, _ = _numbers(trace)
-        m, moving = len(still), [name for name, barrier in trace.scenario.barriers.items() if barrier.moves]
+        m = len(still)
+        moving = [name for name, barrier in trace.scenario.barriers.items() if barrier.moves]
         beside = parts.names[parts.owner[still[column]]] if column < m else [*trace.robots, *moving][others[column - m]]
         return {"robot": trace.robots[members[robot]], "other": beside}
     if parameter in ("mobility", "max_speed_m_s"):

@@ -75,20 +75,25 @@ class OwnMargins(NamedTuple):
 
 def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     """What a robot left of the distance of a pair by its own doing: the other body is held as at the control sample."""
-    other, rows = pair.second if robot == pair.first else pair.first, np.arange(len(trace.t) - 1)
+    other = pair.second if robot == pair.first else pair.first
+    rows = np.arange(len(trace.t) - 1)
     sample = samples_before(trace)
     cores = cores_of(trace).get(other, Cores.at(np.zeros((1, 3))))
-    place, origin, planar = trace.body(robot), origin_of(trace, other), is_planar(trace, robot)
-    keeps, off_m = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m, off_m_of(trace, robot)
+    place = trace.body(robot)
+    origin = origin_of(trace, other)
+    planar = is_planar(trace, robot)
+    keeps = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m
+    off_m = off_m_of(trace, robot)
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
     beside = cores.take(np.flatnonzero(bounds <= max(keeps, pair.safe_m) + step.max())).take((slice(None), None))
-    found = OwnMargins(np.full(len(rows), np.inf), np.full(len(rows), np.inf))
+    margins = OwnMargins(np.full(len(rows), np.inf), np.full(len(rows), np.inf))
     if not len(beside.base):
-        return found
+        return margins
     at_sample = away_from(beside, place[sample] - origin[sample], planar=planar).distance.min(axis=0)
     there = (sample >= pair.row) & (rows < pair.last)
-    gaps, short = gap_over_time(trace, pair), pair.required_m - DISTANCE_TOLERANCE_M
+    gaps = gap_over_time(trace, pair)
+    short = pair.required_m - DISTANCE_TOLERANCE_M
     broken = there & (rows >= _first_apart(pair, gaps)) & (np.minimum(gaps[:-1], gaps[1:]) < short)
     near = there & ((at_sample <= keeps + step) | broken)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
@@ -102,8 +107,8 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
         parts = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
         fine = bent(trace, robot, row, np.linspace(0.0, 1.0, parts + 1)) - origin[sample[row]]
         least[k] = least_distances(beside, fine[:-1], fine[1:], planar=planar)[0].min() - off_m / parts**2
-    found.of_law[near], found.of_body[near] = least - of_law, least - of_body
-    return found
+    margins.of_law[near], margins.of_body[near] = least - of_law, least - of_body
+    return margins
 
 
 def _first_apart(pair: Pair, gaps: Array) -> int:
@@ -182,11 +187,11 @@ def _encounter(trace: Trace, least: Gap) -> Encounter:
     doing = _whose_doing(trace, least)
     drove_on = doing == "under way" or (doing == "nobody" and appeared and _is_late(trace, pair.first))
     under_way_m = _way_m(trace, pair, gaps, least.t_s) if drove_on else 0.0
-    found = Encounter(
+    encounter = Encounter(
         first=pair.first, second=pair.second, required_m=pair.required_m, gap_m=max(least.gap_m, 0.0), t_s=t_s,
         collided=bool(len(hits)), doing=doing, under_way_m=under_way_m, appeared=appeared,
     )  # fmt: skip
-    return _with_reaction(trace, pair, gaps, found) if pair.speed_m_s > 0.0 else found
+    return _with_reaction(trace, pair, gaps, encounter) if pair.speed_m_s > 0.0 else encounter
 
 
 def _whose_doing(trace: Trace, least: Gap) -> str:
@@ -217,9 +222,9 @@ def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:
     return float(np.linalg.norm(np.diff(trace.body(pair.first)[begin : end + 1], axis=0), axis=1).sum())
 
 
-def _with_reaction(trace: Trace, pair: Pair, gaps: Array, found: Encounter) -> Encounter:
+def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) -> Encounter:
     """An encounter, with what the robot did beside an obstacle that may move, and what kept it from more."""
-    periods, t_s = periods_of(trace, pair), found.t_s
+    periods, t_s = periods_of(trace, pair), encounter.t_s
     before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
     k = int(before[-1])
     given = inequalities_of(trace, pair.first)
@@ -238,9 +243,10 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, found: Encounter) -> E
         caught = float(ends[begin]), float(min(ends[end + 1], max(t_s, ends[end])))
         names = dict.fromkeys(name for of_period in blocked[begin : end + 1] for name in of_period)
     velocity = periods.velocity[k]
-    speed, limit = float(np.linalg.norm(velocity)), trace.scenario.robots[pair.first].max_speed_m_s
+    speed = float(np.linalg.norm(velocity))
+    limit = trace.scenario.robots[pair.first].max_speed_m_s
     away = float(periods.normal[k] @ velocity)
-    return found._replace(
+    return encounter._replace(
         reaction=_reaction(speed, away, limit), speed_m_s=speed, blocked_by=(*names,), caught_s=caught
     )
 
@@ -256,7 +262,8 @@ def _reaction(speed: float, away: float, limit: float) -> str:
 
 def _blocked_by(trace: Trace, pair: Pair, periods: Periods, k: int, given: Inequalities, sample: int) -> list[str]:
     """The bodies whose inequalities forbid the straight retreat that a robot should make in a period."""
-    h, limit = trace.scenario.control.period_s, trace.scenario.robots[pair.first].max_speed_m_s
+    h = trace.scenario.control.period_s
+    limit = trace.scenario.robots[pair.first].max_speed_m_s
     wished = min(pair.speed_m_s - (float(periods.apart_m[k]) - pair.law_m) / h, limit)
     if wished <= BLOCKED_M_S:
         return []

@@ -67,10 +67,10 @@ class DecisionRecord:
 
     def __getitem__(self, name: str) -> Array:
         """An array that must be there."""
-        found = self.data[name]
-        if found is None:
+        array = self.data[name]
+        if array is None:
             raise TraceError(f"{self.label}: the problem has no {name!r}")
-        return found
+        return array
 
     @property
     def label(self) -> str:

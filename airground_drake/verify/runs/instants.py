@@ -45,12 +45,12 @@ def lost_at_the_end(trace: Trace) -> list[str]:
 
 def _is_lost(trace: Trace, ugv: str) -> bool:
     switched = [
-        each["kind"] for each in trace.events if each["robot"] == ugv and each["kind"] in ("trigger", "release")
+        event["kind"] for event in trace.events if event["robot"] == ugv and event["kind"] in ("trigger", "release")
     ]
     asked = trace.plans[trace.plans["ugv"] == ugv]
     last = asked[asked["t_s"] == asked["t_s"].max()]
-    found = bool(last["outcome"].isin(["proposed", "passed over"]).any())
-    return switched[-1:] == ["trigger"] and bool((last["reason"] != "").any()) and not found
+    proposed = bool(last["outcome"].isin(["proposed", "passed over"]).any())
+    return switched[-1:] == ["trigger"] and bool((last["reason"] != "").any()) and not proposed
 
 
 def reasons(trace: Trace) -> dict[str, str]:

@@ -121,21 +121,21 @@ def declared_pairs(trace: Trace) -> Iterator[Pair]:
     for given in apart(scenario):
         first, second, *_ = given
         passive, share = given.kind == MOVING, 1.0 if second in there else 0.5
-        one, other = bounds[first], bounds.get(second, AT_REST)
+        own, other = bounds[first], bounds.get(second, AT_REST)
         speed = scenario.barriers[second].expected_speed_m_s if second in there else 0.0
-        reach = (one.speed_m_s + (speed or other.speed_m_s)) * period
+        reach = (own.speed_m_s + (speed or other.speed_m_s)) * period
         row, last = there.get(second, (0, len(trace.t) - 1))
         safe = given.required_m + sum(given.radii_m)
-        drawn = one.cover_m if one.drawn and second in there and not passive else 0.0
-        needs_start = drawn or (not passive and (one.late or other.late))
+        drawn = own.cover_m if own.drawn and second in there and not passive else 0.0
+        needs_start = drawn or (not passive and (own.late or other.late))
         yield Pair(
             first, second, given.required_m, sum(given.radii_m), share, reach, row, last, speed,
-            more_m=float(law_distance(safe, one, other, gain=gain, passive=passive)) - safe,
-            cover_m=sum(each.rolling_m + each.drift_m_s * period for each in (one, other)),
-            drift_m=sum(each.drift_m_s / gain for each in (one, other) if each.drift_m_s),
-            slip_m=one.drift_m_s * period,
+            more_m=float(law_distance(safe, own, other, gain=gain, passive=passive)) - safe,
+            cover_m=sum(plant.rolling_m + plant.drift_m_s * period for plant in (own, other)),
+            drift_m=sum(plant.drift_m_s / gain for plant in (own, other) if plant.drift_m_s),
+            slip_m=own.drift_m_s * period,
             drawn_m=drawn,
-            under_way_s=max(one.delay_s, other.delay_s) if needs_start else None,
+            under_way_s=max(own.delay_s, other.delay_s) if needs_start else None,
         )  # fmt: skip
 
 
@@ -202,12 +202,12 @@ def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar
     """Pairs of a place and a part of a barrier within a distance, m; places, (K, 3), m, are in the order of a way."""
     # Barriers that move are taken where they are at each of the K rows; those that are absent there count for nothing.
     parts = parts_of(trace)
-    found = list[Contacts]()
+    near_parts = list[Contacts]()
     for some, origin in carried(trace):
         near = within(parts.cores.take(some), places - origin[rows], reach, planar=planar)
-        found.append(near._replace(core=some[near.core]))
-    place, core = (np.concatenate([contact[k] for contact in found]) for k in (0, 1))
-    distance, normal = (np.concatenate([contact.away[k] for contact in found]) for k in (0, 1))
+        near_parts.append(near._replace(core=some[near.core]))
+    place, core = (np.concatenate([contact[k] for contact in near_parts]) for k in (0, 1))
+    distance, normal = (np.concatenate([contact.away[k] for contact in near_parts]) for k in (0, 1))
     first, last = lifetimes(trace)
     there = np.flatnonzero((first[core] <= rows[place]) & (rows[place] < last[core]))
     there = there[np.lexsort([core[there], place[there]])]
@@ -228,9 +228,9 @@ def is_planar(trace: Trace, robot: str) -> bool:
     return robot in trace.ugvs
 
 
-def pair_of(trace: Trace, one: str, other: str) -> Pair:
+def pair_of(trace: Trace, first: str, second: str) -> Pair:
     """The pair of two bodies, named in either order."""
-    return pairs_of(trace)[numbers_of(trace)[frozenset((one, other))]]
+    return pairs_of(trace)[numbers_of(trace)[frozenset((first, second))]]
 
 
 @per_trace
@@ -244,7 +244,8 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
     """The smallest gap of a pair over continuous time."""
     # It is exact if both bodies move on straight lines between rows, and to `BENT_M` where it is below the one
     # required; else it is a lower bound.
-    t, off_m = trace.t[pair.rows], off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
+    t = trace.t[pair.rows]
+    off_m = off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
     cores = cores_of(trace).get(pair.second)
     if cores is None:
         first, second = trace.body(pair.first), trace.body(pair.second)
@@ -279,7 +280,8 @@ def at_appearance(trace: Trace, gap: Gap) -> bool:
 @per_trace
 def steered_margin(trace: Trace, pair: Pair) -> float:
     """The least distance of the points of a pair that the law steers, less what the law keeps, m."""
-    cores, first = cores_of(trace).get(pair.second), trace.position(pair.first)[pair.rows]
+    cores = cores_of(trace).get(pair.second)
+    first = trace.position(pair.first)[pair.rows]
     if cores is None:
         second = trace.position(pair.second)[pair.rows]
         return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
@@ -289,14 +291,16 @@ def steered_margin(trace: Trace, pair: Pair) -> float:
 
 def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
-    cores, planar = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3)))), is_planar(trace, pair.first)
+    cores = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3))))
+    planar = is_planar(trace, pair.first)
     way = seen_from(trace, pair.first, pair.second)[pair.rows]
     beside = cores.take((slice(None), None))
     lower = least_distances(beside, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
-    most, t = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS), trace.t[pair.rows]
-    found = list[Approach]()
+    most = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
+    t = trace.t[pair.rows]
+    approaches = list[Approach]()
     for k in sorted(np.flatnonzero(lower < pair.safe_m).tolist(), key=lower.__getitem__):
-        best = min(found).distance_m if found else inf
+        best = min(approaches).distance_m if approaches else inf
         if lower[k] > best:
             break
         for parts in (min(FEW_PARTS, most), most):  # few tell of most segments that the least distance is elsewhere
@@ -312,12 +316,12 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
             if nearest.distance_m > best:
                 break
         else:
-            found.append(nearest)
+            approaches.append(nearest)
     rest = np.delete(lower, np.flatnonzero(lower < pair.safe_m))
     if len(rest):
         k = int(np.flatnonzero(lower == rest.min())[0])
-        found.append(Approach(float(rest.min()), float(t[k]), k + 1))
-    return min(found)
+        approaches.append(Approach(float(rest.min()), float(t[k]), k + 1))
+    return min(approaches)
 
 
 def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:
@@ -350,9 +354,9 @@ def gap_over_time(trace: Trace, pair: Pair) -> Array:
     way = seen_from(trace, pair.first, pair.second)
     if cores is None:
         return np.asarray(np.linalg.norm(way, axis=1)) - pair.radii_m
-    found, rows = np.full(len(trace.t), np.nan), pair.rows
-    found[rows] = over_time(cores, way[rows], planar=is_planar(trace, pair.first)) - pair.radii_m
-    return found
+    gaps_m, rows = np.full(len(trace.t), np.nan), pair.rows
+    gaps_m[rows] = over_time(cores, way[rows], planar=is_planar(trace, pair.first)) - pair.radii_m
+    return gaps_m
 
 
 def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
@@ -370,13 +374,15 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
 
 def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> npt.NDArray[np.bool_]:
     """At which places (K, 3), m, of its steered point a robot is by more than `by_m` too near to a barrier, (K,)."""
-    found, pairs = np.zeros(len(places), dtype=np.bool_), pairs_beside(trace, robot)
-    parts, row = parts_of(trace), max(int(np.searchsorted(trace.t, t_s + MERGE_S)) - 1, 0)
+    too_near = np.zeros(len(places), dtype=np.bool_)
+    pairs = pairs_beside(trace, robot)
+    parts = parts_of(trace)
+    row = max(int(np.searchsorted(trace.t, t_s + MERGE_S)) - 1, 0)
     keep = np.array([pairs[name].law_m for name in parts.names])[parts.owner] - by_m
     rows, most = np.full(len(places), row), float(keep.max(initial=0.0))
     near = contacts(trace, places, rows, most, planar=is_planar(trace, robot))
-    found[near.place[near.away.distance < keep[near.core]]] = True
-    return found
+    too_near[near.place[near.away.distance < keep[near.core]]] = True
+    return too_near
 
 
 def pairs_beside(trace: Trace, robot: str) -> dict[str, Pair]:
@@ -386,12 +392,12 @@ def pairs_beside(trace: Trace, robot: str) -> dict[str, Pair]:
 
 @per_trace
 def _beside(trace: Trace) -> dict[str, dict[str, Pair]]:
-    found = {name: dict[str, Pair]() for name in trace.robots}
+    beside = {name: dict[str, Pair]() for name in trace.robots}
     for pair in declared_pairs(trace):
-        found[pair.first][pair.second] = pair
-        if pair.second in found:
-            found[pair.second][pair.first] = pair
-    return found
+        beside[pair.first][pair.second] = pair
+        if pair.second in beside:
+            beside[pair.second][pair.first] = pair
+    return beside
 
 
 @per_trace
@@ -400,18 +406,18 @@ def apart_of(trace: Trace) -> Array:
     # Obstacles count as there all the time.
     robots, parts = trace.robots, parts_of(trace)
     off = {robot: off_m_of(trace, robot) for robot in robots}
-    found = dict[tuple[str, str], float]()
+    bounds_m = dict[tuple[str, str], float]()
     for robot in robots:
         apart, place = np.empty(len(parts.owner)), trace.body(robot)
         for some, origin in carried(trace):
             apart[some] = apart_by_blocks(parts.cores.take(some), place - origin).min(axis=1) - off[robot]
         least = np.minimum.reduceat(apart, parts.first) if len(apart) else apart
-        found |= {(robot, name): bound for name, bound in zip(parts.names, least.tolist(), strict=True)}
+        bounds_m |= {(robot, name): bound for name, bound in zip(parts.names, least.tolist(), strict=True)}
     first, second = np.triu_indices(len(robots), 1)
     between = apart_at_least(boxes_of(np.stack([trace.body(robot) for robot in robots])), first, second)
     for bound, i, j in zip(between.tolist(), first.tolist(), second.tolist(), strict=True):
-        found[robots[i], robots[j]] = bound - (off[robots[i]] + off[robots[j]])
-    return np.array([found[pair.first, pair.second] for pair in pairs_of(trace)])
+        bounds_m[robots[i], robots[j]] = bound - (off[robots[i]] + off[robots[j]])
+    return np.array([bounds_m[pair.first, pair.second] for pair in pairs_of(trace)])
 
 
 def off_m_of(trace: Trace, name: str) -> float:

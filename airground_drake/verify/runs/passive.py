@@ -89,8 +89,11 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
     which = np.flatnonzero((ends[:-1] >= pair.row) & (ends[:-1] < pair.last))
     row = ends[which]
     around = np.append(row, ends[which[-1:] + 1])  # the ends, too
-    cores, planar, keeps = cores_of(trace)[pair.second], is_planar(trace, pair.first), pair.keeps_m(period)
-    first, origin = trace.position(pair.first)[around], origin_of(trace, pair.second)[around]
+    cores = cores_of(trace)[pair.second]
+    planar = is_planar(trace, pair.first)
+    keeps = pair.keeps_m(period)
+    first = trace.position(pair.first)[around]
+    origin = origin_of(trace, pair.second)[around]
     away = away_from(cores.take((slice(None), None)), (first - origin)[:-1], planar=planar)
     nearest, k = away.distance.argmin(axis=0), np.arange(len(row))
     last = last_period(trace) if len(which) and which[-1] == len(ends) - 2 else Fraction(1)
@@ -119,13 +122,13 @@ def beside(trace: Trace) -> list[Periods]:
 
 def speeds(trace: Trace) -> dict[str, Array]:
     """Mean speeds of the obstacles that move during the control periods, (K,), m/s, by name; 0 while not there."""
-    ends, found = period_ends(trace), dict[str, Array]()
+    ends, mean = period_ends(trace), dict[str, Array]()
     for name, barrier in trace.scenario.barriers.items():
         if barrier.moves:
             speed = np.linalg.norm(np.diff(trace.position(name)[ends], axis=0), axis=1) / np.diff(trace.t[ends])
             there = (ends[:-1] >= trace.there_from(name)) & (ends[:-1] < trace.there_until(name))
-            found[name] = np.where(there, speed, 0.0)
-    return found
+            mean[name] = np.where(there, speed, 0.0)
+    return mean
 
 
 @dataclass(frozen=True)
@@ -158,7 +161,8 @@ def beside_moving(trace: Trace) -> list[BesideMoving]:
 
 
 def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
-    fast, slop = speeds(trace), DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
+    fast = speeds(trace)
+    slop = DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
     for periods in beside(trace):
         pair = periods.pair
         speed = fast.get(pair.second, np.zeros(1))

@@ -61,24 +61,24 @@ def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
 @per_trace
 def proposals_of(trace: Trace) -> list[ProposalRecord]:
     """All proposals of a run, by time."""
-    found = [_sent(trace, row) for row in trace.proposals.to_dict("records")]
-    recorded = sorted((s.ugv, s.issued_s, s.policy) for s in found)
+    proposals = [_sent(trace, row) for row in trace.proposals.to_dict("records")]
+    recorded = sorted((s.ugv, s.issued_s, s.policy) for s in proposals)
     events = sorted((e["robot"], float(e["t_s"]), e["policy"]) for e in trace.events if e["kind"] == "proposal")
     if recorded != events:
         raise TraceError(f"the proposals recorded are {recorded}, those of the events {events}")
-    known = {sent.number: (sent.ugv, sent.issued_s) for sent in found}
-    if len(known) != len(found):
+    known = {sent.number: (sent.ugv, sent.issued_s) for sent in proposals}
+    if len(known) != len(proposals):
         raise TraceError("two proposals have the same number")
     columns = (trace.decisions[name].tolist() for name in ("number", "robot", "issued_s"))
     for number, ugv, issued in zip(*columns, strict=True):
         if known.get(number) != (ugv, issued):
             raise TraceError(f"a decision of {ugv} is on proposal {number}, issued at {issued} s, which it never got")
-    return sorted(found, key=lambda sent: sent.issued_s)
+    return sorted(proposals, key=lambda sent: sent.issued_s)
 
 
 @per_trace
 def proposal_of(trace: Trace, number: int) -> ProposalRecord:
-    found = next((sent for sent in proposals_of(trace) if sent.number == number), None)
-    if found is None:
+    proposal = next((sent for sent in proposals_of(trace) if sent.number == number), None)
+    if proposal is None:
         raise TraceError(f"no proposal has the number {number}")
-    return found
+    return proposal

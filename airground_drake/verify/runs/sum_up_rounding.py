@@ -15,10 +15,10 @@ ROUNDED_ROUTES = ("relaxed", "nonlinear")  # routes that solve (27) and round by
 
 def is_rounded(row: DecisionRecord) -> bool:
     """Whether a relaxed plan or a rounded one was recorded; each needs the other."""
-    found = row.data["relaxed"] is not None or row.data["rounded"] is not None
-    if not found and row.given["route"] in ROUNDED_ROUTES and row.given["status"] == "optimal":
+    rounded = row.data["relaxed"] is not None or row.data["rounded"] is not None
+    if not rounded and row.given["route"] in ROUNDED_ROUTES and row.given["status"] == "optimal":
         raise TraceError(f"{row.label} claims to be complete, but has no relaxation")
-    return found
+    return rounded
 
 
 def integrated_error_s(row: DecisionRecord) -> float:
@@ -31,7 +31,9 @@ def compare_rounding(row: DecisionRecord) -> Iterator[Deviation]:
     # Each stage is judged by the deficit that the recorded stages before it leave, so that one wrong stage does not
     # blur the next. The integrated error is judged against its own bound as well, so that the verdict does not rest on
     # the theorem that follows from the rule.
-    relaxed, rounded, given = row["relaxed"], row["rounded"], row.given
+    relaxed = row["relaxed"]
+    rounded = row["rounded"]
+    given = row.given
     yield Deviation(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)
     yield Deviation(row, "rounded omega is not binary", np.minimum(np.abs(rounded), np.abs(rounded - 1.0)), 0.0)
     deficit = np.cumsum(relaxed) - np.concatenate([[0.0], np.cumsum(rounded)[:-1]])

@@ -86,10 +86,10 @@ def transitions(x: NormSignal, zeta: float, release: float, dwell: float) -> Ite
         if trigger is None:
             return
         yield trigger, "trigger"
-        found = x.reaches(release, trigger, above=False)
-        if found is None:
+        fallen = x.reaches(release, trigger, above=False)
+        if fallen is None:
             return
-        released, resume = found, max(found, trigger + dwell)
+        released, resume = fallen, max(fallen, trigger + dwell)
         yield released, "refractory" if resume > released else "release"
 
 
@@ -97,7 +97,9 @@ def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
     """First row at which the noise of a UGV is not that of dn = -leak n dt + s dW, by Euler's method over rows."""
     # It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at
     # the rate s w / sqrt(h) - leak n.
-    given, t, n = trace.scenario.decision, trace.t, trace.column(f"{ugv}.noise_m")
+    given = trace.scenario.decision
+    t = trace.t
+    n = trace.column(f"{ugv}.noise_m")
     if abs(n[0]) > NOISE_TOLERANCE_M:
         return {"t_s": float(t[0]), "what": "noise: does not start at 0", "noise_m": float(n[0])}
     dt, h = np.diff(t), given.noise_period_s
