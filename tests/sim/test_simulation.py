@@ -96,12 +96,12 @@ def test_runs_in_several_processes_are_those_in_one(
 WARM_UP = """
 from airground_drake.sim import simulation
 from airground_drake.ugv import cost, outcome, relaxation, rollout
-from airground_drake.model.law import kernels, law
+from airground_drake.model.law import kernels, ugv_law
 from airground_drake.scenario.load import load
 
 
 def compiled():
-    modules = (kernels, law, rollout, cost, outcome, relaxation)
+    modules = (kernels, ugv_law, rollout, cost, outcome, relaxation)
     functions = [(f.__qualname__, f) for module in modules for f in vars(module).values() if hasattr(f, "signatures")]
     return {name: list(map(str, f.signatures)) for name, f in functions}
 
