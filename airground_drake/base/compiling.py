@@ -24,13 +24,13 @@ def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:
-            found = _jit(cache=cache, **options)(function)
+            dispatcher = _jit(cache=cache, **options)(function)
         except RuntimeError:  # "no locator available": numba looks for a folder when a function is decorated
             _say()
-            found = _jit(**options)(function)
-        if hasattr(found, "get_call_template"):  # unless NUMBA_DISABLE_JIT is set
-            found.get_call_template = _without_constants(found.get_call_template)
-        return found
+            dispatcher = _jit(**options)(function)
+        if hasattr(dispatcher, "get_call_template"):  # unless NUMBA_DISABLE_JIT is set
+            dispatcher.get_call_template = _without_constants(dispatcher.get_call_template)
+        return dispatcher
 
     return compiled
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from functools import cache
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from pydrake.common import RandomGenerator
@@ -39,6 +39,7 @@ from airground_drake.ugv.rollout import View
 from airground_drake.ugv.routes.mixed_integer import MixedIntegerRoute
 
 Engine = Literal["drake", "batch"]
+ENGINES: tuple[Engine, ...] = get_args(Engine)
 OWN_ACCURACY = 1e-6  # accuracy of integration where a robot has a user's plant: about this many metres in a step
 
 
@@ -245,11 +246,13 @@ def simulate(
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
-        UnknownNameError: if it has no such run.
+        UnknownNameError: if it has no such run, or there is no such engine.
         PluginError: if it names a policy, route, task or plant that cannot be made, or the decision block has other
             ports.
         SimulationError: if Drake or a system stops; names the run and the time.
     """
+    if engine not in ENGINES:
+        raise UnknownNameError("engine", engine, ENGINES)
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
     valid = declared(scenario, plants)

@@ -31,7 +31,7 @@ from oracles.way_left import bounds_of_way_left
 
 Run = Callable[..., Trace]
 EDITED = (("case_a", "d"), ("case_b", "c"), ("case_b", "d"), ("doorway", "d"), ("swap", "c"))
-"""Shipped runs of which other tests here edit the record."""
+"""Shipped runs whose records other tests here edit."""
 
 
 @pytest.mark.parametrize(("scenario", "name"), EDITED)

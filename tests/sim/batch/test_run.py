@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airground_drake.base.errors import SimulationError
+from airground_drake.base.errors import SimulationError, UnknownNameError
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.trigger import excursion
 from airground_drake.model.trigger.excursion import Corners
@@ -119,6 +119,11 @@ def test_what_is_left_to_drake() -> None:
     with pytest.raises(LeftToDrakeError, match="the plant of cart1"):
         Batch(scenario, "d")
     assert first_difference(simulate(scenario, "d"), simulate(scenario, "d", engine="batch")) is None
+
+
+def test_an_engine_that_does_not_exist_is_named() -> None:
+    with pytest.raises(UnknownNameError, match="unknown engine 'fast'; allowed: drake, batch"):
+        simulate(load("minimal"), "a", engine="fast")  # type: ignore[arg-type]
 
 
 def test_errors_are_in_drakes_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
