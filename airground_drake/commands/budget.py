@@ -80,7 +80,7 @@ def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
 
         files.write_text(options.output, drawn_by_value(rows, key))
     if options.json:
-        print(rows.to_json(orient="records", indent=1, double_precision=15))
+        print(json.dumps(rows.astype(object).where(rows.notna(), None).to_dict("records"), indent=1))
         return 0
     print(as_text(rows, key))
     return 0
