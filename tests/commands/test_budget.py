@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from airground_drake.base.errors import ScenarioError
 from airground_drake.commands.budget import main
 
 
@@ -50,11 +51,12 @@ def test_one_imperfection_is_shown_by_its_values(capsys: pytest.CaptureFixture[s
         main(["lagging", "--json", "--set", f"{key}={constant}"])
         pairs = [group for group in json.loads(capsys.readouterr().out) if group["kind"] == "ugv"]
         assert row["ugv law_m"] == max(group["in_the_law_m"] for group in pairs)
-        assert (row[key], row["SAFE-TRACE"], row["ugvs"]) == (constant, "not_exercised", 2)  # half a second: nothing comes near
+        nothing_near = "not_exercised"  # within half a second
+        assert (row[key], row["SAFE-TRACE"], row["ugvs"]) == (constant, nothing_near, 2)
     assert (refused["ended"], refused["ugv law_m"]) == ("invalid", None)
     assert "-1 is not allowed" in refused["what"] or "-1.0 is not allowed" in refused["what"]
     assert ElementTree.parse(picture).getroot().tag.endswith("svg")
-    assert main(["lagging", "d", "--vary", "control.perid_s=1"]) == 2
-    assert "did you mean period_s?" in capsys.readouterr().err
+    with pytest.raises(ScenarioError, match=r"did you mean period_s\?"):
+        main(["lagging", "d", "--vary", "control.perid_s=1"])
     assert main(["lagging", "d"]) == 2
     assert "wanted: --vary, or no run" in capsys.readouterr().err

@@ -41,8 +41,8 @@ def vary(
         jobs: number of processes.
 
     Returns:
-        The rows of `sweep` with the claim about distances; and for each kind of pair KIND (`ugv`, `air_ground`, `obstacle`,
-        `moving`) the columns `KIND promised_m` and `KIND law_m`, of the pair to which the most is added.
+        The rows of `sweep` with the claim about distances; and for each kind of pair KIND (`ugv`, `air_ground`,
+        `obstacle`, `moving`) the columns `KIND promised_m` and `KIND law_m`, of the pair to which the most is added.
 
     Raises:
         ScenarioError: if the key does not exist.
