@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -77,7 +77,7 @@ class Batch:
         breaks, places = components.stack_presets(presets)
         scripts = [vertices_of(body) for body in world.moving[r:]]
         gated, steering = self.gatekeepers is not None, world.steering
-        periods = {loop.PLAN: self.planner.period, **({loop.GATE: given.gatekeeper.period_s} if gated else {})}
+        periods = ((loop.PLAN, self.planner.period), *([(loop.GATE, given.gatekeeper.period_s)] if gated else []))
         ticks, due = _schedule(scenario.duration_s, control.period_s, noise.noise_period_s, periods)
         shortest = min(control.period_s, noise.noise_period_s)
         self.draws = int(scenario.duration_s / noise.noise_period_s) + 2
@@ -339,21 +339,22 @@ class Going:
         ]
 
 
+@lru_cache(maxsize=8)
 def _schedule(
-    duration_s: float, control_s: float, noise_s: float, periods: dict[int, float]
+    duration_s: float, control_s: float, noise_s: float, periods: tuple[tuple[int, float], ...]
 ) -> tuple[Array, loop.Ints]:
     """Times of all timed events, s, and what is due then: with Drake's own arithmetic, k times the period."""
     found: dict[float, int] = {}
     for bit, period in ((loop.CONTROL, control_s), (loop.NOISE, noise_s)):
         for k in range(int(duration_s / period) + 2):
             found[k * period] = found.get(k * period, 0) | bit
-    for bit, period in periods.items():
+    for bit, period in periods:
         ticks = Ticks(period, control_s)
         for k in range(int(duration_s / ticks.period) + 2):
             t = k * ticks.period
             found[t] = found.get(t, 0) | (bit if ticks.due(t) else 0)
     times = sorted(found)
-    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)
+    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)  # nothing writes to them
 
 
 def _holds(breaks: Array, places: Array) -> Array:
