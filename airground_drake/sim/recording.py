@@ -306,7 +306,8 @@ def _messages(memory: PlannerState, trace: Trace, uav: str) -> Iterator[dict[str
             yield row("proposal", number, number, issued, decided.get(number, never))
     for count, (number, t) in enumerate(memory.withdrawn):
         yield row("withdrawal", count, number, t, t)
-    for t, answer, number in zip(*(trace.decisions[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
+    told = trace.decisions[trace.decisions["answer"] >= 0]
+    for t, answer, number in zip(*(told[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
         yield row("answer", answer, number, t, read.get(answer, never))
 
 

@@ -43,7 +43,8 @@ DECISION_COLUMNS = {
 }
 DECISION_LISTS = ("sensed", "known", "new", "told", "asked", "asked_accepted")
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
-that of `Trace.proposals`, `answer` the number of an answer in `Trace.messages`. Columns up to
+that of `Trace.proposals`, `answer` that of the answer in `Trace.messages` that told the UAV of the decision, -1 where
+it changed nothing. Columns up to
 `predicted_clearance_m` belong to decisions by problem (26), the others to decisions by outcomes: the outcome of either
 choice by `ugv.outcome` (cost, 1 if the UGV comes to rest short of its goal, way left), and the number of tries
 since the UGV last rested.
@@ -103,8 +104,8 @@ MESSAGE_COLUMNS = {
 - sender, receiver: names of robots.
 - about: number of the proposal.
 - sent_s, received_s, read_s: times, s; NaN for a message that was lost, or never read. A UGV reads a proposal when its
-  gatekeeper decides on it for the first time. Under method (b) it reads it when it begins to execute it, and does not
-  answer."""
+  gatekeeper decides on it for the first time, and answers when its answer changes or it senses an obstacle that the UAV
+  does not know. Under method (b) it reads it when it begins to execute it, and does not answer."""
 
 PLAN_COLUMNS = {"t_s": "float64", "uav": "str", "ugv": "str", "policy": "str", "outcome": "str", "reason": "str"}
 """Columns of `Trace.plans`, one row per policy that was asked for a plan for a UGV: the outcome is proposed, passed
