@@ -96,7 +96,7 @@ def conditions(
 ) -> Iterator[Condition]:
     """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
     # last: where the n UGVs are at the end of the run, (n, 3), m
-    uav, arrival = scenario.uav, float(scenario.arrival_tolerance_m)
+    arrival = float(scenario.arrival_tolerance_m)
     for ugv, given in scenario.ugvs.items():
         if ugv not in stalls:
             yield _within(ways, ugv, "at its target", given.target_m, arrival)
@@ -106,11 +106,12 @@ def conditions(
         yield Condition({"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved})
         away = float(np.linalg.norm(ways[ugv].position[-1] - given.target_m))
         yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
-    if stalls:
-        over = last.mean(axis=0) + np.array([0.0, 0.0, uav.altitude_m])
-        yield _within(ways, uav.name, "over the centroid of the UGVs", over, arrival)
-    else:
-        yield _within(ways, uav.name, "at its target", uav.target_m, arrival)
+    for name, uav in scenario.aerial.items():
+        if stalls:
+            over = last.mean(axis=0) + np.array([0.0, 0.0, uav.altitude_m])
+            yield _within(ways, name, "over the centroid of the UGVs", over, arrival)
+        else:
+            yield _within(ways, name, "at its target", uav.target_m, arrival)
 
 
 def _within(
