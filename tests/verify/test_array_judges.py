@@ -147,9 +147,7 @@ def test_what_is_wrong_with_a_run_does_not_pass(change: Callable[[Log], Log], lo
 
 
 def test_robots_that_are_left_to_the_judge_of_traces() -> None:
-    for changes, what in (
-        ("ugvs.ugv1.plant={kind: unicycle, hand_point_m: 0.1}", "a robot that does not move as it is told"),
-        ("obstacles.obstacle_1.appears_s=2.0", "an obstacle that appears"),
-    ):
+    turns, appears = load("case_a_unicycle"), load("case_a", [*SHORT, "obstacles.obstacle_1.appears_s=2.0"])
+    for scenario, what in (turns, "does not move as it is told"), (appears, "an obstacle that appears"):
         with pytest.raises(NoScreenError, match=what):
-            ArrayJudges(Batch(load("case_a", [*SHORT, changes]), "a"))
+            ArrayJudges(Batch(scenario, "a"))

@@ -242,7 +242,7 @@ class Going:
             elif code == loop.PYTHON:
                 self._update()
             else:
-                raise LeftToDrakeError("the run ends in an error")
+                raise LeftToDrakeError("a run that ends in an error")
 
     def plan_ahead(self) -> None:
         """Plan for this instant, before its updates, which then take this result; the last one counts."""
@@ -275,13 +275,8 @@ class Going:
         done = Done(
             t=log.t,
             logged={name: rows.T for name, rows in logged.items()},
-<<<<<<< HEAD
-            memory=self.memory,
+            memories={batch.planner.sender.uav: self.memory},
             decided=self.decided,
-=======
-            memories={batch.planner.sender.uav: self._memory},
-            decided=self._answering.made,
->>>>>>> main
             seed=self._seed,
             until_s=self.t,
             wall_s=self.wall_s,

@@ -178,7 +178,7 @@ def _agree(screens: Sequence[Verdict], verdicts: Sequence[Verdict], trace: Trace
     for ours, theirs in zip(screens, verdicts, strict=True) if screens else ():
         numbers = [float("nan") if verdict.margin is None else verdict.margin for verdict in (ours, theirs)]
         same = (ours.status, ours.exercised) == (theirs.status, theirs.exercised)
-        if not same or not np.isclose(*numbers, rtol=0.0, atol=SAME, equal_nan=True):
+        if not same or not np.isclose(numbers[0], numbers[1], rtol=0.0, atol=SAME, equal_nan=True):
             told = [
                 f"{verdict.status}, margin {verdict.margin}, {verdict.exercised} times" for verdict in (ours, theirs)
             ]
