@@ -30,10 +30,8 @@ UNLIMITED = Budget(iterations=10_000, search_iterations=10**9, search_s=np.inf)
 
 
 def program(problem: Problem, blocks: int | None = None) -> tuple[BinaryProgram, np.ndarray]:
-    binary = BinaryProgram(problem.stages, blocks or problem.stages)
     normals = normals_along(problem, ConstantPlans.of(problem).better.positions)
-    binary.update(problem, normals)
-    return binary, normals
+    return BinaryProgram(problem, normals, blocks), normals
 
 
 @pytest.mark.parametrize(
@@ -62,15 +60,15 @@ def test_the_program_is_the_problem(blocks: int) -> None:
         plan = values[block_of_stage(12, blocks)]
         lacking = problem.distances - np.sum(normals * (problem.positions(plan)[:, None] - problem.centres), axis=2)
         slack = np.maximum(0.0, lacking).max(axis=1)
-        made, every = binary.program, np.zeros(12 + blocks)
-        every[made.FindDecisionVariableIndices(binary.omega)] = values
-        every[made.FindDecisionVariableIndices(binary.u)] = slack
+        made, every = binary.program, np.append(values, slack)
         claimed = sum(float(made.EvalBinding(each, every)[0]) for each in made.GetAllCosts())
         assert claimed == pytest.approx(float(cost(problem, plan, normals)), rel=1e-12)
         assert made.CheckSatisfied(made.GetAllConstraints(), every, 1e-9)
-        assert {omega.get_type() for omega in binary.omega} == {Variable.Type.BINARY}
-        demanded, rows = np.zeros(12), binary.half_planes.evaluator()
-        for row, lower in zip(rows.GetDenseA(), rows.lower_bound(), strict=True):
+        assert {omega.get_type() for omega in made.decision_variables()[:blocks]} == {Variable.Type.BINARY}
+        assert binary.form.cost(every) == pytest.approx(claimed, rel=1e-12)
+        assert len(binary.form.rows) == sum(row.evaluator().num_constraints() for row in made.linear_constraints())
+        demanded = np.zeros(12)
+        for row, lower in zip(binary.form.rows, binary.form.lower, strict=True):
             stage = row[blocks:].argmax()
             demanded[stage] = max(demanded[stage], lower - row[:blocks] @ values)
         np.testing.assert_allclose(demanded, slack, atol=1e-12)  # by the half-planes that are not left out
