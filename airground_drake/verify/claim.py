@@ -16,6 +16,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError, described
 from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
+from airground_drake.model.bodies import motion
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.finding import Chart, Evidence, Failure, Finding
@@ -331,7 +332,7 @@ def require_body(trace: Trace, robot: str) -> None:
 def followed(trace: Trace, robot: str) -> Array:
     """The signals of a body that follows the recorded commands from rest, (T, k)."""
     samples, period = {*trace.sample_rows.tolist()}, trace.scenario.control.period_s
-    return trace.plant(robot).followed(trace.t, trace.position(robot), trace.command(robot), samples, period)
+    return motion.followed(trace.plant(robot), trace.t, trace.position(robot), trace.command(robot), samples, period)
 
 
 def _begins(trace: Trace, robot: str) -> None:

@@ -12,7 +12,7 @@ A plant is one file: its keys in a scenario (`Keys`) and all that others ask of 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import ClassVar, NamedTuple
@@ -21,7 +21,6 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.plants.budget import Bounds
 
 # Signals of a body that is not where the law steers it: its position, world frame.
@@ -145,19 +144,6 @@ class Plant:
     def at(self, memory: Array, base: Array, command: Array, elapsed_s: float) -> Array:
         """The signals of the body, s after the last sample: from the memory then, and base (3,), m, and command now."""
         return np.empty(0)
-
-    def followed(self, t_s: Array, base: Array, command: Array, samples: Collection[int], period_s: float) -> Array:
-        """The signals at T rows, (T, k), of a body that follows commands from rest, as the block of Drake has it."""
-        # base: (T, 3), m; command: in force up to each row, (T, 3), m/s; samples: rows at which another one is chosen
-        memory, since = self.memory(), t_s[0]
-        signals = [self.at(memory, base[0], command[0], 0.0)]
-        for row in range(1, len(t_s)):
-            elapsed = float(t_s[row] - since)
-            elapsed = period_s if abs(elapsed - period_s) <= SAME_S else elapsed
-            signals.append(self.at(memory, base[row], command[row], elapsed))
-            if row in samples:
-                memory, since = self.remembered(memory, command[row], elapsed), t_s[row]
-        return np.array(signals)
 
     def bends_m(self, t_s: Array, signals: Array) -> Array:
         """How far the body may be from the straight line between two rows, (T - 1,), m; signals (T, k)."""

@@ -13,7 +13,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError, described
 from airground_drake.base.registry import UAV_TASKS, method_of
-from airground_drake.model.bodies.motion import SAME_S
+from airground_drake.model.bodies.motion import SAME_S, followed
 from airground_drake.model.law.task import Task
 from airground_drake.model.law.tasks import FormationTask
 from airground_drake.model.plants.delay import Delay
@@ -298,9 +298,9 @@ class Going:
         samples = np.searchsorted(log.t, ticks[ticks <= log.t[-1]], side="right") - 1
         return np.concatenate([
             next(turning) if isinstance(body.plant, Unicycle)
-            else body.plant.followed(
-                log.t, log.bodies[:, 3 * i : 3 * i + 3], log.command[:, 3 * i : 3 * i + 3], {*samples.tolist()},
-                batch.given.control.period_s,
+            else followed(
+                body.plant, log.t, log.bodies[:, 3 * i : 3 * i + 3], log.command[:, 3 * i : 3 * i + 3],
+                {*samples.tolist()}, batch.given.control.period_s,
             )
             for i, body in enumerate(batch.world.bodies[: len(batch.world.robots)]) if body.plant and body.plant.signals
         ], axis=1)  # fmt: skip
