@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+import functools
+import threading
 
 import numpy as np
 import numpy.typing as npt
@@ -32,13 +33,23 @@ class BinaryProgram:
     over omega and u: n.(rho(omega) - o) >= d - u. As constraints, the positions would make a solver ten times slower.
     """
 
-    def __init__(self, problem: Problem, normals: Array, blocks: int | None = None) -> None:
-        """Of a problem with N stages, along unit normals (N, m, 3), with B accept variables, at most one per stage."""
-        n = problem.stages
-        self.problem, self.normals = problem, normals
-        self.block = block_of_stage(n, blocks or n)  # of each stage, (N,)
-        self.count = int(self.block[-1]) + 1  # B
-        self._of_block = np.equal.outer(self.block, np.arange(self.count)).astype(np.float64)
+    def __init__(self, stages: int, blocks: int) -> None:
+        """A program without any problem's data, for N stages and B <= N accept variables, one per block of stages."""
+        n, b = stages, blocks
+        self.program, self.count = MathematicalProgram(), b  # (26); with shares in place of binary values it is (27)
+        self.block = block_of_stage(n, b)  # of each stage, (N,)
+        self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
+        # Binary variables (24), (26c), (B,): 1 accepts. Then slack (26e), (N,), m.
+        x = np.append(self.program.NewBinaryVariables(b, "omega"), self.program.NewContinuousVariables(n, "u"))
+        cost = self.program.AddQuadraticCost(np.zeros((b + n, b + n)), np.zeros(b + n), x, is_convex=True)  # (25)
+        # (26d): one row per half-plane that can bind, or an empty one
+        rows = self.program.AddLinearConstraint(np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), x)
+        choices = self.program.AddBoundingBoxConstraint(np.zeros(b + n), np.full(b + n, np.inf), x)  # (26c), (26e)
+        self._cost, self._rows, self._choices = cost.evaluator(), rows.evaluator(), choices.evaluator()
+
+    def update(self, problem: Problem, normals: Array) -> None:
+        """Put in the data of a problem of this size, with half-planes along unit normals (N, m, 3)."""
+        self.problem, self.normals, n, b = problem, normals, problem.stages, self.count
         steps = (problem.dt * (problem.accept - problem.refuse))[:, :AXES]
         refused = problem.positions(np.zeros(n))
         away = (refused - problem.reference)[:, :AXES]
@@ -46,37 +57,27 @@ class BinaryProgram:
         # a stage's choice moves all later ends: column j of d rho_k / d omega_j is steps[j] for k >= j
         remaining = np.cumsum(weights[::-1])[::-1]
         later = np.maximum.outer(np.arange(n), np.arange(n))
-        of_omega = self._of_block.T @ (steps @ steps.T * remaining[later]) @ self._of_block
+        hessian = np.diag(np.full(b + n, 2.0 * problem.dt * problem.slack_weight))
+        hessian[:b, :b] = self._of_block.T @ (steps @ steps.T * remaining[later]) @ self._of_block
         force = np.cumsum((weights[:, None] * away)[::-1], axis=0)[::-1]
-        gradient = self._of_block.T @ (steps * force).sum(axis=1)
+        gradient = np.append(self._of_block.T @ (steps * force).sum(axis=1), np.zeros(n))
         height = refused[:, 2] - problem.reference[:, 2]  # no choice changes it
         constant = 0.5 * float(weights @ (np.square(away).sum(axis=1) + np.square(height)))
-        hessian = np.diag(np.full(self.count + n, 2.0 * problem.dt * problem.slack_weight))
-        hessian[: self.count, : self.count] = of_omega
+        self._cost.UpdateCoefficients(hessian, gradient, constant, is_convex=True)
         # 1 is allowed only where the choice moves the UGV, so that no solver need try both
-        self._live = of_omega.diagonal() > _IDLE**2 * of_omega.diagonal().max()
-        # which half-planes are rows: those that can bind, (N, m)
+        self._live = hessian.diagonal()[:b] > _IDLE**2 * hessian.diagonal()[:b].max()
+        self._choices.UpdateUpperBound(np.append(self._live, np.full(n, np.inf)))
+        # which half-planes are rows, (N, m)
         self.within = within_reach(problem) & (problem.slack_weight > 0.0)
-        rows, lower = self._rows(steps, refused - problem.reference)
-        # Binary variables (24), (26c), (B,): 1 accepts. Then slack (26e), (N,), m.
+        rows, lower = self._half_planes(steps, refused - problem.reference)
+        self._rows.UpdateCoefficients(rows, lower, np.full(len(lower), np.inf))
+        # the program as DAQP takes it: all costs and constraints are on all variables, in their order
         self.form = Form(
-            constant, hessian, np.append(gradient, np.zeros(n)), rows, lower, np.full(len(lower), np.inf),
-            np.zeros(self.count + n), np.append(self._live, np.full(n, np.inf)), np.arange(self.count + n) < self.count,
+            self._cost.c(), self._cost.Q(), self._cost.b(), self._rows.GetDenseA(), self._rows.lower_bound(),
+            self._rows.upper_bound(), self._choices.lower_bound(), self._choices.upper_bound(), np.arange(b + n) < b,
         )  # fmt: skip
 
-    @cached_property
-    def program(self) -> MathematicalProgram:
-        """For any solver of Drake; with shares in place of binary values it is (27)."""
-        made, form = MathematicalProgram(), self.form
-        omega = made.NewBinaryVariables(self.count, "omega")
-        x = np.append(omega, made.NewContinuousVariables(self.problem.stages, "u"))
-        made.AddQuadraticCost(form.hessian, form.gradient, form.constant, x, is_convex=True)  # (25)
-        if len(form.rows):
-            made.AddLinearConstraint(form.rows, form.lower, form.upper, x)  # (26d)
-        made.AddBoundingBoxConstraint(form.least, form.most, x)  # (26c), (26e)
-        return made
-
-    def _rows(self, steps: Array, away: Array) -> tuple[Array, Array]:
+    def _half_planes(self, steps: Array, away: Array) -> tuple[Array, Array]:
         """Coefficients (rows, B + N) and lower bounds of the half-planes that can bind."""
         # `steps` is what accepting at a stage adds to the position, (N, 2), m, and `away` are the task errors of
         # refusing throughout, (N, 3), m.
@@ -88,6 +89,8 @@ class BinaryProgram:
         lower = offsets(self.problem, self.normals)[stage, point] - (normal[:, :AXES] * away[stage, :AXES]).sum(axis=1)
         binding = _may_bind(stage, of_omega, lower)
         self.within[stage[~binding], point[~binding]] = False
+        if not binding.any():
+            return np.zeros((1, self.count + n)), np.full(1, -np.inf)
         of_u = np.equal.outer(stage[binding], np.arange(n)).astype(np.float64)
         return np.hstack([of_omega[binding], of_u]), lower[binding]
 
@@ -132,3 +135,10 @@ def _may_bind(stage: npt.NDArray[np.intp], of_omega: Array, lower: Array) -> npt
                 more += min(0.0, of_omega[j, b] - of_omega[i, b])
             kept[j] = more < 0.0
     return kept
+
+
+class Programs(threading.local):
+    """The programs of one thread by their sizes: to build one takes longer than to put in the data of a problem."""
+
+    def __init__(self) -> None:
+        self.of = functools.cache(BinaryProgram)  # of a number of stages and of blocks, to be updated

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.ugv.binary_program import BinaryProgram
+from airground_drake.ugv.binary_program import BinaryProgram, Programs
 from airground_drake.ugv.budget import Budget
 from airground_drake.ugv.drake_solvers import Minimiser, relax
 from airground_drake.ugv.plan_search import cheap_plan, distinct, improve
@@ -59,13 +59,14 @@ class MixedIntegerRoute:
         if blocks is not None and blocks < 1:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
-        self._search = Minimiser(solver)
+        self._search, self._programs = Minimiser(solver), Programs()
 
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
-        binary = BinaryProgram(problem, normals_along(problem, constants.better.positions), self._blocks)
+        binary = self._programs.of(problem.stages, min(self._blocks or problem.stages, problem.stages))
+        binary.update(problem, normals_along(problem, constants.better.positions))
         shares, bound = _relaxed(binary)
         known = _known(binary, shares)
         plan = problem.evaluate(cheap_plan(problem.terms, binary.block, known))
@@ -79,7 +80,7 @@ class MixedIntegerRoute:
             plan = min(plans, key=lambda candidate: candidate.objective)
             if plan.objective >= proof.bound * (1.0 - _AGREE):
                 break
-            again = search.again(BinaryProgram(problem, normals_along(problem, plan.positions), self._blocks), plan)
+            again = search.again(binary, plan)
             if again is None or again.status != "optimal":
                 proof = replace(proof, status=again.status if again else proof.status)
                 break
@@ -122,6 +123,7 @@ class _Searches:
 
     def again(self, binary: BinaryProgram, plan: Evaluation) -> _Proof | None:
         """Search along half-planes at a plan; None if the relaxation shows that this would be long."""
+        binary.update(binary.problem, normals_along(binary.problem, plan.positions))
         bound = _relaxed(binary)[1]
         return None if bound < (1.0 - _WORTH) * plan.objective else self.along(binary, [plan], bound)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground_drake.ugv.binary_program import BinaryProgram
+from airground_drake.ugv.binary_program import Programs
 from airground_drake.ugv.budget import Budget
 from airground_drake.ugv.drake_solvers import relax
 from airground_drake.ugv.problem import Problem
@@ -33,12 +33,16 @@ class RelaxedRoute:
     the better constant plan decides.
     """
 
+    def __init__(self) -> None:
+        self._programs = Programs()
+
     def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         normals = normals_along(problem, constants.better.positions)
-        program = BinaryProgram(problem, normals)
+        program = self._programs.of(problem.stages, problem.stages)
+        program.update(problem, normals)
         result = relax(program, budget.left_s(), ACTIVE_SETS * budget.iterations)
         if result.omega is None:
             return without_optimum(problem, constants, budget, normals, ended=result.ended)
