@@ -1,17 +1,21 @@
-"""`airground budget SCENARIO`: what the distances of a scenario cost, kind of pair by kind of pair."""
+"""`airground budget SCENARIO`: what the distances of a scenario cost, and what one imperfection changes."""
 
 from __future__ import annotations
 
+import argparse
 import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
-from airground_drake.base.usage import output_file
+from airground_drake.base.parallel import processors
+from airground_drake.base.usage import output_file, refuse
+from airground_drake.scenario.document import parsed
 from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
     from airground_drake.scenario.budget import PairBudget
+    from airground_drake.scenario.schema import Scenario
 
 MOST_NAMED = 6  # bodies that are named in a line at most
 
@@ -20,11 +24,15 @@ def parser() -> Parser:
     return parser_of(
         "budget",
         "Print, for each kind of pair, the promised distance, the distance that the law keeps between steered points, "
-        "and what each term takes. Distances are between surfaces.",
+        "and what each term takes. Distances are between surfaces. With --vary, simulate the runs for each value of a "
+        "key, and print distances and arrivals.",
         {
             "scenario": None,
-            "-o --output": option("draw the budget, too, as SVG", "FILE", output_file),
-            "--json": "print every kind of pair as JSON",
+            "run": "with --vary (default: all runs)",
+            "-o --output": option("draw it, too, as SVG", "FILE", output_file),
+            "--json": "print all of it as JSON",
+            "--vary": option("a key, such as channel.delay_s=0,0.1,0.3; without values some usual ones", "KEY=VALUES"),
+            "--jobs": None,
             "--set": None,
         },
     )
@@ -37,6 +45,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from airground_drake.scenario.load import load
 
     scenario = load(options.scenario, options.set)
+    if options.vary is not None:
+        return _vary(scenario, options)
+    if options.run is not None:
+        return refuse(f"run {options.run!r}: a budget is the same for all runs; wanted: --vary, or no run")
     groups = alike(budget(scenario))
     if options.output is not None:
         from airground_drake.report.view.budget import drawn
@@ -53,6 +65,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"    {term.key}{owner}: {term.metres:.4f} m")
         if pair.start:
             print(f"    promised only with {pair.start}")
+    return 0
+
+
+def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
+    """Distances and arrivals by the values of one key."""
+    from airground_drake.study.campaign.vary import as_text, usual_values, vary
+
+    key, _, given = options.vary.partition("=")
+    values = parsed(f"[{given}]", "--vary").data or usual_values(key)
+    rows = vary(scenario, key, values, [options.run] if options.run else (), options.jobs or processors())
+    if options.output is not None:
+        from airground_drake.report.view.budget import drawn_by_value
+
+        files.write_text(options.output, drawn_by_value(rows, key))
+    if options.json:
+        print(json.dumps(rows.astype(object).where(rows.notna(), None).to_dict("records"), indent=1))
+        return 0
+    print(as_text(rows, key))
     return 0
 
 

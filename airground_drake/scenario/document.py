@@ -224,6 +224,7 @@ def way(data: Any, key: str) -> list[Any]:
     """The values of a document that a dotted key leads through, as far as they are there."""
     values = []
     for part in place_of(key):
+        data = _inside(data, part)
         if isinstance(data, list):
             data = dict(zip(map(str, range(len(data))), data, strict=True))
         if not isinstance(data, dict) or part not in data:
@@ -233,12 +234,20 @@ def way(data: Any, key: str) -> list[Any]:
     return values
 
 
+def _inside(data: Any, name: str) -> Any:
+    """The only item of a list that has this key: a plant may be written as a list of one plant, and is kept so."""
+    return (
+        data[0] if isinstance(data, list) and len(data) == 1 and isinstance(data[0], dict) and name in data[0] else data
+    )
+
+
 def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
     """Change a document: put another value at a place."""
     data = document.data
     for place in [written for written in document.places if written[: len(at)] == at]:
         del document.places[place]
     for depth, name in enumerate(at, start=1):
+        data = _inside(data, name)
         options = [*data] if isinstance(data, dict) else [*map(str, range(len(data if isinstance(data, list) else ())))]
         if name not in options and not (name and isinstance(data, dict)):
             raise unknown(source, ".".join(at[:depth]), name, options)

@@ -15,7 +15,15 @@ from pydantic import ConfigDict, Field
 
 from airground_drake.base.files import sha256
 from airground_drake.base.limits import MAX_CORNERS, MAX_RECTANGLES, MAX_STAGES, MAX_UGVS
-from airground_drake.base.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.base.registry import (
+    METHODS,
+    MODEL_CLAIMS,
+    POLICIES,
+    ROUTES,
+    RUN_CLAIMS,
+    UAV_TASKS,
+    UGV_CONTROLLERS,
+)
 from airground_drake.base.values import (
     Count,
     CountFromZero,
@@ -28,6 +36,7 @@ from airground_drake.base.values import (
     Words,
     YesNo,
 )
+from airground_drake.model.bodies.world import Kind
 from airground_drake.scenario.kinds import (
     CLAIMS,
     AirPoint,
@@ -67,6 +76,8 @@ AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+OPTIONAL: tuple[str, ...] = ("ugv_controller",)
+"""Sections that a scenario need not have; without them, it is written and digested as if they did not exist."""
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
@@ -293,6 +304,19 @@ class Control:
     """Gain of tracking an intervention, (14)."""
     sensing_range_m: Positive = 4.0
     """Robots sense nothing beyond it; it covers every safe distance, both radii and a period of closing speed."""
+
+
+@dataclass(slots=True)
+class OwnController:
+    """A controller of the user's own for all UGVs, a Drake System with the outputs of the package's.
+
+    Distances and the steps of a run are judged as any; claims about the package's law and its predictions are not run.
+    """
+
+    kind: Annotated[Words, registered(UGV_CONTROLLERS)]
+    """Its class: `module:Class` or `file.py:Class`."""
+    parameters: dict[Name, Real] = field(default_factory=dict)
+    """Numbers for its class, by name."""
 
 
 @dataclass(slots=True)
@@ -546,6 +570,8 @@ class Scenario:
     """Distances to keep."""
     control: Control = field(default_factory=Control)
     """The controllers."""
+    ugv_controller: OwnController | None = None
+    """A controller of your own, in place of the package's."""
     decision: Decision = field(default_factory=Decision)
     """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)
@@ -563,10 +589,14 @@ class Scenario:
     choices: list[Choice] = field(default_factory=list)
     """Origins of values that are not from the paper."""
 
+    def data(self) -> dict[str, Any]:
+        """The scenario as nested dicts and lists, with all defaults."""
+        return {key: value for key, value in asdict(self).items() if value is not None or key not in OPTIONAL}
+
     @property
     def digest(self) -> str:
         """SHA-256 of the scenario as nested dicts and lists in strict JSON, with all defaults and without spaces."""
-        text = json.dumps(asdict(self), separators=(",", ":"), allow_nan=False)
+        text = json.dumps(self.data(), separators=(",", ":"), allow_nan=False)
         return sha256(text.encode())
 
     @property
@@ -585,9 +615,38 @@ class Scenario:
         return bodies
 
     @property
+    def aerial(self) -> dict[str, Uav]:
+        """The UAVs, by name."""
+        return {self.uav.name: self.uav}
+
+    @property
     def robots(self) -> dict[str, Ugv | Uav]:
-        """The UGVs and then the UAV, by name."""
-        return {**self.ugvs, self.uav.name: self.uav}
+        """The UGVs and then the UAVs, by name."""
+        return {**self.ugvs, **self.aerial}
+
+    def kind_of(self, name: str) -> Kind:
+        """What the body of this name is.
+
+        Raises:
+            KeyError: if there is no such body.
+        """
+        if name in self.ugvs:
+            return "ugv"
+        if name in self.aerial:
+            return "uav"
+        if name in self.obstacles or name in self.barriers:
+            return "obstacle"
+        raise KeyError(name)
+
+    def pair_of(self, first: str, second: str) -> str:
+        """The kind of a pair of robots: `ugv` or `air_ground`; with `_m` the key of its safe distance."""
+        kinds = {self.kind_of(first), self.kind_of(second)}
+        return "air_ground" if len(kinds) == 2 else kinds.pop()
+
+    def key_of(self, name: str) -> str:
+        """The key of a body in a scenario file; walls of the arena count as obstacles."""
+        kind = self.kind_of(name)
+        return "uav" if kind == "uav" else MAP if name == MAP else f"{kind}s.{name}"
 
     @property
     def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:

@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, UnknownNameError, short
 from airground_drake.base.registry import METHODS, UAV_TASKS, Method, method_of
 from airground_drake.model.bodies.world import ROBOTS, World
@@ -36,6 +38,7 @@ from airground_drake.sim.blocks import (
     UgvController,
     VelocityDisturbance,
 )
+from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvController
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
 
 # Exported output ports of the diagram: the signals of a trace.
@@ -62,9 +65,9 @@ class Model:
     world: World  # all bodies, in the order of the port `bodies`
     decision_block: System  # drives the trigger
     trigger: EventTrigger  # of all UGVs
-    planner: InterventionPlanner  # the UAV's planner
+    planners: Mapping[str, InterventionPlanner]  # of each UAV, by its name
     gatekeeper: Gatekeeper | None  # of methods (c) and (d), else None
-    controllers: tuple[UgvController, UavController]  # of the UGVs, and of the UAV
+    controllers: tuple[UgvController | OwnUgvController | UavController, ...]  # of the UGVs, and of each UAV
     signals: tuple[str, ...]  # names of the columns of `plant_signals` and `own_headings`
     recorded: tuple[str, ...]  # names of the exported output ports that are the signals of a trace
 
@@ -76,6 +79,7 @@ def build_diagram(
     plants: Mapping[str, OwnPlant] = NO_PLANTS,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    ugv_controller: ControllerFactory | None = None,
 ) -> Diagram:
     """The diagram of a scenario, for inspection, simulation or embedding.
 
@@ -86,6 +90,8 @@ def build_diagram(
         plants: plants of your own, by robot, in place of those of the scenario.
         monitor: watches the diagram while it runs; see `make_monitor`.
         decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
+        ugv_controller: makes a controller of your own for all UGVs, in place of that of the scenario: a System with the
+            output ports of `UgvController`, whose input ports are fed by name; see docs/extending.md.
 
     Returns:
         A Diagram whose default context has every robot at its start. For a simulation its context needs an accuracy:
@@ -97,10 +103,11 @@ def build_diagram(
     Raises:
         ScenarioError: if the scenario is not valid.
         UnknownNameError: if there is no such method or composition.
-        PluginError: if a policy, route, task or plant of the scenario cannot be made, or the decision block does not
-            have the ports of one.
+        PluginError: if a policy, route, task, plant or controller of the scenario cannot be made, or the decision block
+            or the controller does not have the ports of one.
     """
-    return build_model(declared(scenario, plants), method, composition, plants, monitor, decision_block).diagram
+    valid = declared(scenario, plants, ugv_controller)
+    return build_model(valid, method, composition, plants, monitor, decision_block, ugv_controller).diagram
 
 
 def build_model(
@@ -110,14 +117,15 @@ def build_model(
     plants: Mapping[str, OwnPlant] = NO_PLANTS,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    ugv_controller: ControllerFactory | None = None,
     *,
     disturbed: bool = True,
     make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
 ) -> Model:
     """Build and wire all components of one method of a valid scenario; see `build_diagram`."""
-    # `plants` are those that the scenario declares (`sim.blocks.plant.declared`). Without `disturbed` the diagram has
-    # no inputs for disturbances: commands go straight to the plants. `make_gatekeepers` replaces the gatekeepers;
-    # claims about decisions are about the default.
+    # `plants` and `ugv_controller` are what the scenario declares (`sim.blocks.plant.declared`). Without `disturbed`
+    # the diagram has no inputs for disturbances: commands go straight to the plants. `make_gatekeepers` replaces the
+    # gatekeepers; claims about decisions are about the default.
     chosen, composition = _chosen(scenario, method, composition)
     world, presets = make_world(scenario), components.make_presets(scenario)
     n = len(world.names("ugv"))
@@ -132,23 +140,30 @@ def build_model(
     made = {body.name: plant_system(body, scenario.control.period_s, plants) for body in world.moving}
     signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))
     vehicles = _vehicles(world, made, disturbed=disturbed)
-    planner = InterventionPlanner(components.make_planner(scenario, chosen), world, scenario.control.period_s)
+    planners = {
+        uav: InterventionPlanner(components.make_planner(scenario, chosen, uav), world, scenario.control.period_s)
+        for uav in scenario.aerial
+    }
     gatekeeper = None
     if chosen.gated:
         periods = {"period": scenario.gatekeeper.period_s, "control": scenario.control.period_s}
         gatekeeper = Gatekeeper(make_gatekeepers(scenario, law), world, **periods)
     answering = DirectAcceptance(n) if gatekeeper is None else gatekeeper
     answers = {name: answering.GetOutputPort(name) for name in ("answers", "reports")}
-    controllers = UgvController(world, law), _uav_controller(scenario, world)
+    own = scenario.ugv_controller
+    ugvs = OwnUgvController(own, world, law, ugv_controller) if own else UgvController(world, law)
+    uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
     parts = {
         "decision_making": decision,
-        "task_planning": _task_planning(presets, planner, *controllers),
+        "task_planning": _task_planning(presets, planners, ugvs, uavs),
         "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers),
         "vehicles": vehicles,
     }
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
+    if isinstance(ugvs, OwnUgvController):
+        ugvs.require_inputs(named)
     recorded = (*RECORDED, *(name for name in OF_PLANTS if name in named))
     exported = [*recorded, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
@@ -157,9 +172,9 @@ def build_model(
         world=world,
         decision_block=block,
         trigger=trigger,
-        planner=planner,
+        planners=planners,
         gatekeeper=gatekeeper,
-        controllers=controllers,
+        controllers=(ugvs, *uavs.values()),
         signals=signals,
         recorded=recorded,
     )
@@ -201,14 +216,19 @@ def _decision_making(scenario: Scenario, n: int, variable: System, events: Event
 
 
 def _task_planning(
-    presets: Sequence[Motion], planner: InterventionPlanner, ugvs: UgvController, uav: UavController
+    presets: Sequence[Motion],
+    planners: Mapping[str, InterventionPlanner],
+    ugvs: UgvController | OwnUgvController,
+    uavs: Mapping[str, UavController],
 ) -> Diagram:
-    """The task planning layer: preset trajectories, planner, controllers."""
+    """The task planning layer: preset trajectories, planners, controllers."""
     times, places = components.stack_presets(list(presets))
     reference = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T), output_derivative_order=1)
-    systems = {
-        "reference": reference, "intervention_planner": planner, "ugv_controller": ugvs, "uav_controller": uav,
-    }  # fmt: skip
+    systems: dict[str, System] = {"reference": reference}
+    systems |= {name: planners[uav] for uav, name in _named("intervention_planner", planners).items()}
+    systems |= {"ugv_controller": ugvs}
+    systems |= {name: uavs[uav] for uav, name in _named("uav_controller", uavs).items()}
+    (planner,), (uav,) = planners.values(), uavs.values()
     named = {
         "reference": reference.get_output_port(),
         "proposals": planner.GetOutputPort("proposals"),
@@ -219,6 +239,12 @@ def _task_planning(
         "uav_command": uav.GetOutputPort("command"),
     }
     return _assembled("task_planning", systems, named)
+
+
+def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:
+    """Names of a block of each UAV: that of the block, and with several UAVs of the UAV."""
+    names = [*uavs]
+    return {uav: block if len(names) == 1 else f"{block}_{uav}" for uav in names}
 
 
 def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
@@ -320,23 +346,33 @@ def make_monitor(
         terminate: end the simulation at the first violation.
 
     Raises:
-        ScenarioError, UnknownNameError, PluginError: as `build_diagram`.
+        ScenarioError, UnknownNameError, PluginError: as `build_diagram`; also if the UGVs have a controller of the
+            user's: no law is known that it must obey.
     """
     scenario = validated(scenario)
+    if scenario.ugv_controller is not None:
+        told = f"ugv_controller {scenario.ugv_controller.kind!r} has no law that is known here"
+        raise PluginError(f"{told}; allowed for a monitor: a scenario without one")
     chosen, composition = _chosen(scenario, method, composition)
     world = make_world(scenario)
     ugvs = UgvController(world, components.make_law(scenario, chosen, composition))
-    laws = Laws(ugvs.velocity, _uav_controller(scenario, world).velocity)
-    return Monitor(world, components.make_avoidance(scenario), laws, terminate=terminate)
+    uavs = [_uav_controller(scenario, world, uav) for uav in scenario.aerial]
+
+    def of_uavs(t: float, positions: Array, commands: Array) -> Array:
+        return np.stack([uav.velocity(t, positions, commands) for uav in uavs])
+
+    return Monitor(world, components.make_avoidance(scenario), Laws(ugvs.velocity, of_uavs), terminate=terminate)
 
 
-def _uav_controller(scenario: Scenario, world: World) -> UavController:
+def _uav_controller(scenario: Scenario, world: World, name: str) -> UavController:
+    uav = scenario.aerial[name]
     return UavController(
         world,
         components.make_avoidance(scenario),
-        task=UAV_TASKS.load(scenario.uav.task, of=Task),
+        uav=name,
+        task=UAV_TASKS.load(uav.task, of=Task),
         gain=scenario.control.formation_gain_1_s,
-        altitude=scenario.uav.altitude_m,
+        altitude=uav.altitude_m,
     )
 
 

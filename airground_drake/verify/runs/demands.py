@@ -60,7 +60,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     safe, share = safe[:, column], share[:, column]
     bodies = np.unique(parts.owner[moving], return_inverse=True)[1]
     carrier = np.concatenate([everybody, len(robots) + bodies])
-    with_uav = np.array([name == scenario.uav.name for name in robots])
+    with_uav = np.array([scenario.kind_of(name) == "uav" for name in robots])
     wanted = {}
     for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
         beside = np.array([np.delete(np.arange(len(column)), m + i) for i in team])
@@ -79,6 +79,9 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
         }
         if len(moving):
             wanted[name]["moving_outlines"] = that_move
+    if own := scenario.ugv_controller:  # it is judged by its steps, whatever it was built with
+        sampling_s = wanted["ugv_controller"]["sampling_s"]
+        return wanted | {"ugv_controller": {"class": own.kind, "sampling_s": sampling_s}}
     of_run = scenario.runs[trace.run]
     wanted["ugv_controller"]["composition"] = of_run.composition
     if of_run.method != NO_INTERVENTION:
