@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
 from airground_drake.report import rules
-from airground_drake.report.html import number
+from airground_drake.report.quantities import number
 from airground_drake.report.sentences import MARKS, Line
 from airground_drake.report.templating import environment_of
 from airground_drake.report.view import canvas, svg
