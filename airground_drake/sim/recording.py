@@ -183,8 +183,6 @@ def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str,
         "known": list(rested_on.known),
         "new": list(rested_on.new),
         "told": list(rested_on.told),
-        "asked": [number for number, _ in rested_on.asked],
-        "asked_accepted": [int(accepted) for _, accepted in rested_on.asked],
     }
     solution = decision.solution
     if solution is None:

@@ -41,7 +41,7 @@ DECISION_COLUMNS = {
     "accept_left_m": "float64",
     "tries": "float64",
 }
-DECISION_LISTS = ("sensed", "known", "new", "told", "asked", "asked_accepted")
+DECISION_LISTS = ("sensed", "known", "new", "told")
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
 that of `Trace.proposals`, `answer` that of the answer in `Trace.messages` that told the UAV of the decision, -1 where
 it changed nothing. Columns up to
@@ -59,8 +59,7 @@ order of the scenario:
 - known: obstacles sensed so far and not seen to be gone (method (d)).
 - new: obstacles sensed for the first time that are not on the proposal's map (method (d)).
 - told: rows of the proposal's map that were believed (method (d)).
-- asked, asked_accepted: numbers of the proposals that other UGVs had and had not refused, and whether they had accepted
-  them, 0 or 1 (method (d))."""
+Of other UGVs a prediction knows where they are, how fast they go, and what the same joint plan asks of them."""
 
 PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s")
 PROBLEM_ARRAYS = (

@@ -110,8 +110,7 @@ def executed_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
     """The proposal that a UGV should execute, at each control sample of the run, or None.
 
     A proposal is in force from its sending until it is withdrawn (`withdrawn_s`). Under method (b) it is executed all
-    that time; under (c) and (d) while the gatekeeper's last decision accepts it. A part of a joint plan is executed
-    only while every other part in force is accepted or done.
+    that time; under (c) and (d) while the gatekeeper's last decision accepts it.
     """
 
     def found() -> list[ProposalRecord | None]:
@@ -132,14 +131,11 @@ def _in_force(trace: Trace, sent: ProposalRecord, now: float) -> bool:
 
 
 def _is_accepted(trace: Trace, sent: ProposalRecord, now: float) -> bool:
-    """Whether a proposal in force is accepted at `now`, s, and all other parts in force are accepted or done."""
+    """Whether a proposal in force is accepted at `now`, s."""
     if trace.meta["method"] not in GATED_METHODS:
         return True
     own = _answer_at(trace, sent, now)
-    if own is None or not own.accepted:
-        return False
-    others = [_answer_at(trace, part, now) for part in parts_of(trace, sent) if _in_force(trace, part, now)]
-    return not any(answer is None or answer.refused for answer in others)
+    return own is not None and own.accepted
 
 
 def _answer_at(trace: Trace, sent: ProposalRecord, now: float) -> Answer | None:
