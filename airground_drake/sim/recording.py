@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -27,6 +27,7 @@ from airground_drake.sim.tables import (
     PROBLEM_SCALARS,
     PROPOSAL_COLUMNS,
     SCHEMA,
+    listed,
     typed,
 )
 from airground_drake.sim.trace import Trace
@@ -54,10 +55,11 @@ SAME_S = 1e-6  # a row this near to a multiple of the control period is at that 
 
 
 def trace_of(
-    scenario: Scenario, name: str, world: World, done: Done, signals: Sequence[str], own_plants: Iterable[str] = ()
+    scenario: Scenario, name: str, world: World, done: Done, signals: Sequence[str], own_plants: Collection[str] = ()
 ) -> Trace:
     """The trace of a run of a scenario; `signals` as of `states`, `own_plants` are robots with users' plants."""
     run, ugvs, uav = scenario.runs[name], world.names("ugv"), world.names("uav")[0]
+    given = replace(own(scenario, name), duration_s=done.until_s)
     keep = distinct(done.t, done.logged["team_command"])
     t, logged = done.t[keep], {port: rows[:, keep] for port, rows in done.logged.items()}
     rows = states(t, logged, ugvs, [body.name for body in world.moving], signals)
@@ -78,14 +80,15 @@ def trace_of(
     trace = Trace(
         meta,
         states=rows,
-        samples=sampled.assign(**measured(rows, sampled, own_plants)),
-        decisions=decisions(done.decided, ugvs, own(scenario, name).gatekeeper.route),
+        samples=sampled.assign(**measured(rows, sampled, own_plants)) if own_plants else sampled,
+        decisions=decisions(done.decided, ugvs, given.gatekeeper.route),
         timings={"wall_s": done.wall_s, "decision_times_s": [decision.cpu_s for decision in done.decided]},
         problems=problems(done.decided),
         proposals=proposals(ugvs, done.memory.sent),
         plans=plans(done.memory.asked, done.memory.sent, ugvs, uav),
     )
     trace = replace(trace, messages=messages(done.memory, trace, uav))
+    trace.derived("scenario", lambda: given)  # it need not be read from the metadata
     meta["events"] = extract(trace)
     return trace
 
@@ -166,11 +169,13 @@ def decisions(decided: Sequence[GatekeeperDecision], ugvs: Sequence[str], route:
     return typed([_decision(made, ugvs[made.robot], route) for made in decided], DECISION_COLUMNS, *DECISION_LISTS)
 
 
+_BLANK: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
+
+
 def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str, Any]:
     """A row of `Trace.decisions`."""
-    row: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
     rested_on = decision.basis
-    row |= {
+    row: dict[str, Any] = _BLANK | {
         "t_s": decision.t,
         "robot": robot,
         "policy": decision.proposal.policy,
@@ -234,7 +239,7 @@ def problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:
         )
         for p, s in planned
     ]  # fmt: skip
-    return pd.DataFrame(rows, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS])
+    return listed(rows, (*PROBLEM_SCALARS, *PROBLEM_ARRAYS))
 
 
 def proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.DataFrame:
@@ -249,7 +254,7 @@ def proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.D
         )
         for i, proposal in sent
     ]  # fmt: skip
-    return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
+    return listed(rows, PROPOSAL_COLUMNS)
 
 
 def plans(asked: Sequence[Asked], sent: Sequence[tuple[int, Proposal]], ugvs: Sequence[str], uav: str) -> pd.DataFrame:
@@ -293,7 +298,8 @@ def _messages(memory: PlannerState, trace: Trace, uav: str) -> Iterator[dict[str
         }  # fmt: skip
 
     read, never = dict(memory.read), float("nan")
-    decided = trace.decisions.groupby("number")["t_s"].min().to_dict()
+    latest_first = (trace.decisions[name].tolist()[::-1] for name in ("number", "t_s"))
+    decided = dict(zip(*latest_first, strict=True))  # when each was decided on first
     for i, proposal in memory.sent:
         number, issued = proposal.number, proposal.issued
         if trace.meta["method"] == "b":  # accepted at once

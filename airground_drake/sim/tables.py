@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -122,11 +123,39 @@ TABLES = ("states", "samples", "seen", "messages", "proposals", "plans", "decisi
 """Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""
 
 
+TEXT: Any = pd.Series(dtype="str").dtype
+
+
 def typed(rows: Sequence[Mapping[str, Any]], kinds: Mapping[str, str], *lists: str) -> pd.DataFrame:
     """A table of rows with columns of some kinds, and columns whose cells are lists."""
-    # Each column is made with its type: `astype` for all of them takes three times as long.
+    # Each column is made with its type: Series, or `astype` for all of them, take three times as long.
+    if not rows:
+        return _empty(*kinds.items(), *((name, "object") for name in lists)).copy()
+    return _columns(rows, {**kinds, **dict.fromkeys(lists, "object")})
+
+
+@cache
+def _empty(*kinds: tuple[str, str]) -> pd.DataFrame:
+    return _columns([], dict(kinds))
+
+
+def _columns(rows: Sequence[Mapping[str, Any]], kinds: Mapping[str, str]) -> pd.DataFrame:
     columns: dict[str, Any] = {}
-    for name, kind in {**kinds, **dict.fromkeys(lists, "object")}.items():
+    for name, kind in kinds.items():
         cells = [row[name] for row in rows]
-        columns[name] = np.array(cells, kind) if kind not in ("str", "object") else pd.Series(cells, dtype=kind)
+        if kind == "object":
+            columns[name] = np.empty(len(cells), dtype=object)
+            columns[name][:] = cells
+        else:
+            columns[name] = pd.array(cells, dtype=TEXT) if kind == "str" else np.array(cells, kind)
     return pd.DataFrame(columns)
+
+
+def listed(rows: Sequence[tuple[Any, ...]], columns: tuple[str, ...]) -> pd.DataFrame:
+    """A table of rows with columns of any type."""
+    return pd.DataFrame(rows, columns=list(columns)) if rows else _none(columns).copy()
+
+
+@cache
+def _none(columns: tuple[str, ...]) -> pd.DataFrame:
+    return pd.DataFrame(columns=list(columns))
