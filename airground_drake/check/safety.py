@@ -310,7 +310,7 @@ def _motion(run: Run) -> None:
         slow = speed <= spec["max_speed_m_s"] + SMALL
         most = f"{spec['max_speed_m_s']} at most"
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)
-        if robot != run.uav:
+        if robot in run.ugvs:
             close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)
     for name in run.moving:
         rows = run.period_rows(name)

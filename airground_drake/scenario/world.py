@@ -20,7 +20,7 @@ def make_world(scenario: Scenario) -> World:
     safe = scenario.safe_distance
     control = scenario.control
     robots = [_robot(name, "ugv", ugv, control.period_s) for name, ugv in scenario.ugvs.items()]
-    robots += [_robot(scenario.uav.name, "uav", scenario.uav, control.period_s)]
+    robots += [_robot(name, "uav", uav, control.period_s) for name, uav in scenario.aerial.items()]
     obstacles = [_obstacle(scenario, name, body) for name, body in scenario.barriers.items()]
     obstacles.sort(key=lambda body: body.plant is None)
     apart: dict[frozenset[Kind], float] = {

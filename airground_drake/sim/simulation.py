@@ -116,7 +116,8 @@ class Recorder:
             simulator = self.begin(seed, watch, speed)
             self.advance(simulator, self._scenario.duration_s if duration is None else duration)
         finally:
-            self.model.planner.close()
+            for planner in self.model.planners.values():
+                planner.close()
         return self.trace(simulator, seed, time.perf_counter() - started)
 
     def begin(
@@ -179,7 +180,9 @@ class Recorder:
         done = Done(
             t=log.sample_times(),
             logged=dict(zip(model.recorded, np.split(log.data(), ends[:-1]), strict=True)),
-            memory=model.planner.memory(model.planner.GetMyContextFromRoot(context)),
+            memories={
+                uav: planner.memory(planner.GetMyContextFromRoot(context)) for uav, planner in model.planners.items()
+            },
             decided=decided,
             seed=self._scenario.seed if seed is None else seed,
             until_s=context.get_time(),

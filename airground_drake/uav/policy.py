@@ -145,6 +145,7 @@ class Proposal:
         party: names of all UGVs in the same joint plan; empty: the proposal stands alone.
         beside: what the same joint plan asks of the others, by name, so that a UGV needs no other message to judge it.
         number: identifies the proposal in the UGV's answer. `planner.sent_after` gives it; before that it is -1.
+        sender: name of the UAV that sends it, as `planner.sent_after` gives it.
     """
 
     policy: str
@@ -156,6 +157,7 @@ class Proposal:
     party: tuple[str, ...] = ()
     beside: tuple[tuple[str, Motion], ...] = ()
     number: int = -1
+    sender: str = ""
 
     @property
     def joint(self) -> tuple[float, tuple[str, ...]]:

@@ -48,8 +48,8 @@ class LeftToDrakeError(Exception):
 class Batch:
     """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
-    # Left to Drake: users' plants, lags and delays, and tasks of the UAV that are not the package's; monitors,
-    # observers, decision blocks and disturbances are no part of a scenario.
+    # Left to Drake: users' plants, lags and delays, several UAVs, and tasks of the UAV that are not the package's;
+    # monitors, observers, decision blocks and disturbances are no part of a scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Set it up: everything that does not depend on the seed."""
@@ -61,11 +61,14 @@ class Batch:
         for body in world.moving:
             if not isinstance(body.plant, FirstOrder | Unicycle | Scripted):
                 raise LeftToDrakeError(f"the plant of {body.name}")
-        if UAV_TASKS.load(given.uav.task, of=Task) is not FormationTask:
-            raise LeftToDrakeError(f"the task {given.uav.task} of the UAV")
+        (flown_by, uav), *more = given.aerial.items()
+        if more:
+            raise LeftToDrakeError("several UAVs")
+        if UAV_TASKS.load(uav.task, of=Task) is not FormationTask:
+            raise LeftToDrakeError(f"the task {uav.task} of the UAV")
         presets = components.make_presets(given)
         self.law = components.make_law(given, method, run.composition)  # type: ignore[arg-type]
-        self.planner = components.make_planner(given, method)
+        self.planner = components.make_planner(given, method, flown_by)
         self.gatekeepers: Gatekeepers | None = components.make_gatekeepers(given, self.law) if method.gated else None
         self._avoidance = components.make_avoidance(given)
         self.near = Around(world.around(world.select("ugv")), world.around(world.select("uav")))
@@ -81,7 +84,7 @@ class Batch:
         self.team = Team(
             law=self.law.numbers,
             layer=self._avoidance.layer,
-            uav=np.array([given.uav.altitude_m, control.formation_gain_1_s], dtype=np.float64),
+            uav=np.array([uav.altitude_m, control.formation_gain_1_s], dtype=np.float64),
             steering=np.zeros((n, NUMBERS)) if steering is None else steering,
             turns=steering is not None,
             levels=trigger.levels,
@@ -202,7 +205,7 @@ class Going:
         return float(self._state.time[0])
 
     def positions(self) -> Array:
-        """Positions of all robots, UAV last, (n + 1, 3), m."""
+        """Positions of all r robots, (r, 3), m."""
         return self._state.place[: len(self._batch.world.robots)].copy()
 
     def advance(self, until: float) -> None:
@@ -242,7 +245,7 @@ class Going:
         done = Done(
             t=log.t,
             logged={name: rows.T for name, rows in logged.items()},
-            memory=self._memory,
+            memories={batch.planner.sender.uav: self._memory},
             decided=self._answering.made,
             seed=self._seed,
             until_s=self.t,
@@ -286,7 +289,7 @@ class Going:
             memory, t, places[: len(batch.world.robots)], intervening, np.array(self._answers()),
             self._answering.reports, stands, sightings(batch.world, t, places),
         )  # fmt: skip
-        return sent_after(memory, planned, t)
+        return sent_after(memory, planned, t, batch.planner.sender)
 
     def _judged(self) -> GatekeeperState:
         """What the gatekeepers remember after a sample."""

@@ -83,7 +83,6 @@ class Condition(NamedTuple):
 def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator[Condition]:
     """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
     scenario = trace.scenario
-    uav = trace.scenario.uav
     arrival = float(trace.scenario.arrival_tolerance_m)
     for ugv in trace.ugvs:
         target = scenario.ugvs[ugv].target_m
@@ -95,12 +94,13 @@ def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator
         yield Condition({"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved})
         away = float(np.linalg.norm(_end(trace, ugv) - target))
         yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
-    if stalls:
-        centroid = np.mean([trace.position(ugv)[-1] for ugv in trace.ugvs], axis=0)
-        over = centroid + np.array([0.0, 0.0, uav.altitude_m])
-        yield _within(trace, uav.name, "over the centroid of the UGVs", over, arrival)
-    else:
-        yield _within(trace, uav.name, "at its target", uav.target_m, arrival)
+    for name, uav in scenario.aerial.items():
+        if stalls:
+            centroid = np.mean([trace.position(ugv)[-1] for ugv in trace.ugvs], axis=0)
+            over = centroid + np.array([0.0, 0.0, uav.altitude_m])
+            yield _within(trace, name, "over the centroid of the UGVs", over, arrival)
+        else:
+            yield _within(trace, name, "at its target", uav.target_m, arrival)
 
 
 def _within(trace: Trace, robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float) -> Condition:
