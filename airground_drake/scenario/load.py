@@ -97,7 +97,7 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"{type(scenario).__name__} is no Scenario")
-    return dataclasses.asdict(scenario)
+    return scenario.as_data()
 
 
 def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -> Scenario:

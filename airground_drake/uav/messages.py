@@ -45,6 +45,15 @@ class Report(NamedTuple):
     seen: tuple[Sighting, ...] = ()  # obstacles that move and that the UGV sensed when it decided
 
 
+class Told(NamedTuple):
+    """What a UGV's answer says over a channel."""
+
+    verdict: float = SILENT  # on the proposal that it is about
+    report: Report = Report()
+    newest: int = -1  # the highest number of a proposal that the UGV has read of
+    holds: int = -1  # number of the proposal in force; -1: none
+
+
 Reports = tuple[Report, ...]  # one entry per UGV
 
 Proposals = tuple[Proposal | None, ...]  # one entry per UGV

@@ -133,6 +133,7 @@ class Planner:
     # Per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.
     trails: tuple[bool, ...] = ()
     sender: Sender = ONLY  # the UAV
+    lead: float = 0.0  # time that a proposal is under way, s
 
     @property
     def radii(self) -> Array:
@@ -225,7 +226,7 @@ class Planner:
                 continue
             seen = Observation(
                 t=t,
-                start=t + self.period,
+                start=t + self.period + self.lead,
                 robot=robot,
                 position=positions[i],
                 target=self.targets[i],

@@ -48,7 +48,7 @@ class LeftToDrakeError(Exception):
 class Batch:
     """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
-    # Left to Drake: users' plants, lags and delays, several UAVs, and tasks of the UAV that are not the package's;
+    # Left to Drake: plants of users, lags and delays, channels, several UAVs, tasks of the UAV that are of users;
     # monitors, observers, decision blocks and disturbances are no part of a scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
@@ -62,6 +62,8 @@ class Batch:
             if not isinstance(body.plant, FirstOrder | Unicycle | Scripted):
                 raise LeftToDrakeError(f"the plant of {body.name}")
         (flown_by, uav), *more = given.aerial.items()
+        if given.channel is not None and method.intervenes:
+            raise LeftToDrakeError("a channel")
         if more:
             raise LeftToDrakeError("several UAVs")
         if UAV_TASKS.load(uav.task, of=Task) is not FormationTask:
