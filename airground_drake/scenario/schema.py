@@ -70,7 +70,7 @@ AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
-SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
+SETTABLE: tuple[str, ...] = ("channel", "decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
 

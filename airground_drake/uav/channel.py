@@ -133,7 +133,8 @@ def _changes(link: str, loss: float, burst_s: float, until: float) -> tuple[bool
     lot, t, changes = random.Random(f"{link}/bursts"), 0.0, list[float]()
     begins_bad = bad = lot.random() < loss
     while t <= until:
-        t += lot.expovariate(1.0 / (burst_s if bad else burst_s * (1.0 - loss) / loss))
+        rate = 1.0 / burst_s if bad else loss / (burst_s * (1.0 - loss))
+        t += lot.expovariate(rate) if rate > 0.0 else math.inf
         changes.append(t)
         bad = not bad
     return begins_bad, tuple(changes)

@@ -12,7 +12,7 @@ from airground_drake.verify.runs.acceptances import METHOD
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.fault import Fault
-from oracles.protocol import withdrawn_s
+from oracles.protocol import held_until
 from oracles.sensing import news
 
 NO_DIFFERENCE = 1e-6
@@ -54,7 +54,7 @@ def wrong_answers(trace: Trace) -> list[Fault]:
 def _unended(trace: Trace, last: DecisionRecord) -> Iterator[Fault]:
     """An acceptance without a further decision: its proposal was withdrawn before the next sample, or the run over."""
     after = last.t_s + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
-    if withdrawn_s(trace, proposal_of(trace, last.number)) > after and after <= trace.t[-1]:
+    if held_until(trace, proposal_of(trace, last.number)) > after and after <= trace.t[-1]:
         yield Fault("an acceptance just ends", last.robot, last.t_s)
 
 
