@@ -19,7 +19,7 @@ from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.verify import judge
 
-SCENARIOS = "case_a case_b lab swap crossing intersection doorway turtlebots".split()
+SCENARIOS = ["case_a", "case_b", "lab", "swap", "crossing", "intersection", "doorway", "turtlebots"]
 CLAIMS = ("SAFE-TRACE", "SAFE-OWN", "SAFE-HYP", "LIVE-HYP")
 
 
@@ -47,7 +47,10 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
             if status != "holds":
                 others[f"{claim} {status}"].append(where)
     delays, losses = sorted({row["delay_s"] for row in rows}), sorted({row["loss"] for row in rows})
-    lines = ["| scenario | " + " | ".join(f"{delay:g} s" for delay in delays) + " |", "| --- " * (1 + len(delays)) + "|"]
+    lines = [
+        "| scenario | " + " | ".join(f"{delay:g} s" for delay in delays) + " |",
+        "| --- " * (1 + len(delays)) + "|",
+    ]
     for scenario in dict.fromkeys(row["scenario"] for row in rows):
         shown = [" / ".join(_cell(cells[scenario, delay, loss]) for loss in losses) for delay in delays]
         lines.append(f"| `{scenario}` | " + " | ".join(shown) + " |")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import zip_longest
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -350,7 +350,8 @@ def carried(
 def _deliveries(transit: Transit, read: Sequence[float]) -> Iterator[tuple[Delivery, float, float]]:
     """What a link carried or lost; when it arrived and was read, s."""
     never = float("nan")
-    for delivery, read_s in zip_longest(transit.arrived, read, fillvalue=never):
+    unread = (never for _ in transit.arrived)
+    for delivery, read_s in zip(transit.arrived, chain(read, unread), strict=False):
         yield delivery, delivery.received_s, read_s
     yield from ((delivery, never, never) for delivery in transit.under_way)
     yield from ((Delivery(never, -1, 0, message), never, never) for message in transit.lost)

@@ -110,7 +110,7 @@ def message_table(events: Sequence[dict[str, Any]], decisions: Sequence[dict[str
     sent += [("answer", d["answer"], d["robot"], uav, d.get("number", 0), d["t_s"]) for d in decisions]
     names = ("kind", "number", "sender", "receiver", "about", "sent_s")
     rows = [dict(zip(names, each, strict=True)) for each in sent]
-    return typed([row | {"copy": 0, "received_s": row["sent_s"], "read_s": row["sent_s"]} for row in rows],
+    return typed([row | {"attempt": 0, "copy": 0, "received_s": row["sent_s"], "read_s": row["sent_s"]} for row in rows],
                  MESSAGE_COLUMNS)  # fmt: skip
 
 

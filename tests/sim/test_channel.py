@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from oracles import ORACLES, faults_of
+from oracles import faults_of
 from properties import examples
 from pydrake.common.value import Value
 
@@ -34,8 +34,8 @@ def over(given: Channel | None, scenario: str = "lab", run: str = "d", *more: st
 
 
 @pytest.mark.parametrize(("scenario", "name"), [("case_b", "b"), ("case_b", "c"), ("case_b", "d"), ("doorway", "d")])
-def test_a_channel_that_does_nothing_changes_nothing(run: Run, scenario: str, name: str) -> None:
-    without, silent = run(scenario, name), over(Channel(), scenario, name)
+def test_a_channel_that_does_nothing_changes_nothing(scenario: str, name: str) -> None:
+    without, silent = over(None, scenario, name), over(Channel(), scenario, name)
     for table in ("states", "samples", "decisions", "proposals", "plans"):
         both = (getattr(trace, table).drop(columns="answer", errors="ignore") for trace in (without, silent))
         pd.testing.assert_frame_equal(*both, check_exact=True)
@@ -70,7 +70,7 @@ def test_whatever_the_channel_does_the_protocol_is_kept(given_: Channel, run: st
     assert not faults_of(trace)
     if run == "d":
         verdicts = {verdict.claim.id: verdict.status for verdict in judge(trace)}
-        assert {verdicts[claim] for claim in ("SAFE-TRACE", "SAFE-OWN", "SAFE-HYP", "LIVE-HYP")} == {"holds"}
+        assert {verdicts[claim] for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP")} == {"holds"}
 
 
 @pytest.mark.slow
@@ -104,17 +104,11 @@ def never(box: Any, *_: Any) -> Any:
 
 
 def all_is_new(before: Any, arrived: Any, t: float) -> Any:
-    return replace(desk.read(replace(before, newest=(-1,) * len(before.newest)), arrived, t))
-
-
-def of_proposals_only(before: Any, arrived: Any, t: float) -> Any:
-    """A withdrawal does not count as read."""
-    new = arrived[len(before.read_s) :]
-    read = desk.read(before, arrived, t)
-    newest = list(before.newest)
-    for message in (delivery.message for delivery in new if delivery.message.kind == "proposal"):
-        newest[message.ugv] = max(newest[message.ugv], message.about)
-    return replace(read, newest=tuple(newest)) if new else read
+    """Of the proposals that have arrived, the last one is taken up."""
+    after, held = desk.read(before, arrived, t), list(before.held)
+    for message in (delivery.message for delivery in arrived[len(before.read_s) :]):
+        held[message.ugv] = message.content
+    return replace(after, held=tuple(held)) if after is not before else before
 
 
 repeated = channel.repeated
@@ -125,7 +119,6 @@ MUTANTS: dict[str, tuple[Any, str, Any, str, Channel]] = {
     "old proposals are taken up": (gatekeeper, "read", all_is_new, "executes another proposal", NOISY),
     "copies are not answered": (gatekeeper, "replied", lambda d, _, *more: desk.replied(d, (), *more),
                                 "does not answer what it reads", NOISY),
-    "refusals are repeated for ever": (desk, "MOST_REPEATS", 99, "answers too often", Channel(up=WayBack(loss=0.99))),
     "the link loses without loss": (Link, "fate", lambda self, m: [] if m.number % 2 else [0.0], "lost without",
                                     Channel()),
     "the link is too late": (Link, "fate", lambda self, m: [0.4], "arrives at another time", Channel()),
@@ -140,12 +133,6 @@ def test_a_protocol_with_a_fault_is_noticed(name: str, monkeypatch: pytest.Monke
     scenario, settings = ("case_b", ["reproduction=[]"]) if given_ is not NOISY else ("lab", [])
     found = faults_of(over(given_, scenario, "d", *settings))
     assert any(fault.what.startswith(what) for faults in found.values() for fault in faults), found
-
-
-def test_a_withdrawal_that_does_not_count_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A copy of a proposal that arrives after its withdrawal is taken up again."""
-    monkeypatch.setattr(gatekeeper, "read", of_proposals_only)
-    assert any(ORACLES["protocol"](over(replace(NOISY, seed=seed))) for seed in range(3))
 
 
 def test_an_idle_link_keeps_its_state() -> None:

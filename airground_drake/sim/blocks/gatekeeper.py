@@ -141,13 +141,13 @@ class DirectAcceptance(LeafSystem):
     def __init__(self, count: int, *, channel_period: float | None = None) -> None:
         """Of so many UGVs; with a channel the controllers' period, s."""
         super().__init__()
-        self._count, self._state = count, None
+        self._channel = channel_period is not None
         if channel_period is None:
             self._proposals = Messages(self, "proposals", count, Proposal)
             needs = {self._proposals.port.ticket()}
         else:
             state = self.DeclareAbstractState(Value(Obeying.empty(count)))
-            self._state, held = state, {self.abstract_state_ticket(state)}
+            self._state, held = int(state), {self.abstract_state_ticket(state)}
             self._inbox = declare_inbox(self, count, held, weakly(self._calc_held), weakly(self._calc_outbox), now=True)
             needs = {*held, self._inbox.ticket()}
             self.DeclarePeriodicUnrestrictedUpdateEvent(channel_period, 0.0, weakly(self._update))
@@ -164,11 +164,11 @@ class DirectAcceptance(LeafSystem):
         return self._now(context).desk
 
     def _now(self, context: Context) -> Obeying:
-        before: Obeying = context.get_abstract_state(int(self._state)).get_value()
+        before: Obeying = context.get_abstract_state(self._state).get_value()
         return before.after(self._inbox.Eval(context))
 
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
-        held = self._proposals.Eval(context) if self._state is None else self.desk(context).held
+        held = self.desk(context).held if self._channel else self._proposals.Eval(context)
         output.SetFromVector(laid_out(Answer, obeyed(held)))
 
     def _calc_held(self, context: Context, output: AbstractValue) -> None:
@@ -178,7 +178,7 @@ class DirectAcceptance(LeafSystem):
         output.set_value(self.desk(context).outbox)
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        held = state.get_mutable_abstract_state(int(self._state))
+        held = state.get_mutable_abstract_state(self._state)
         now = self._now(context)
         if now is held.get_value():
             return EventStatus.DidNothing()
