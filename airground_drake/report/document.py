@@ -51,7 +51,7 @@ def build(
         for verdict in verdicts
     ]
     items = sorted(map(dict, audit), key=lambda item: item["id"])
-    resolved = asdict(scenario)
+    resolved = scenario.data()
     about = {key: resolved[key] for key in ("name", "title", "description")}
     runs = {name: _run(scenario, trace) for name, trace in traces.items()}
     numbers = expected_numbers(scenario, runs)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from functools import cache, partial
 from hashlib import sha256
 from importlib import resources
@@ -105,7 +104,7 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
     }
     return environment().get_template("report.html.j2").render(
         report=report,
-        resolved=asdict(report.scenario.resolved),
+        resolved=report.scenario.resolved.data(),
         first=first_screen(report),
         linked={name: words for name, words in LINKS.items() if sections.get(name, True)},
         sections=[(name, title) for name, title in SECTIONS.items() if sections.get(name, True)],

@@ -15,7 +15,15 @@ from pydantic import ConfigDict, Field
 
 from airground_drake.base.files import sha256
 from airground_drake.base.limits import MAX_CORNERS, MAX_RECTANGLES, MAX_STAGES, MAX_UGVS
-from airground_drake.base.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.base.registry import (
+    METHODS,
+    MODEL_CLAIMS,
+    POLICIES,
+    ROUTES,
+    RUN_CLAIMS,
+    UAV_TASKS,
+    UGV_CONTROLLERS,
+)
 from airground_drake.base.values import (
     Chance,
     Count,
@@ -70,6 +78,8 @@ AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+OPTIONAL: tuple[str, ...] = ("channel", "ugv_controller")
+"""Sections that a scenario need not have; without them, it is written and digested as if they did not exist."""
 SETTABLE: tuple[str, ...] = ("channel", "decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
@@ -296,6 +306,19 @@ class Control:
     """Gain of tracking an intervention, (14)."""
     sensing_range_m: Positive = 4.0
     """Robots sense nothing beyond it; it covers every safe distance, both radii and a period of closing speed."""
+
+
+@dataclass(slots=True)
+class OwnController:
+    """A controller of the user's own for all UGVs, a Drake System with the outputs of the package's.
+
+    Distances and the steps of a run are judged as any; claims about the package's law and its predictions are not run.
+    """
+
+    kind: Annotated[Words, registered(UGV_CONTROLLERS)]
+    """Its class: `module:Class` or `file.py:Class`."""
+    parameters: dict[Name, Real] = field(default_factory=dict)
+    """Numbers for its class, by name."""
 
 
 @dataclass(slots=True)
@@ -594,6 +617,8 @@ class Scenario:
     """Distances to keep."""
     control: Control = field(default_factory=Control)
     """The controllers."""
+    ugv_controller: OwnController | None = None
+    """A controller of your own, in place of the package's."""
     decision: Decision = field(default_factory=Decision)
     """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)
@@ -613,16 +638,15 @@ class Scenario:
     choices: list[Choice] = field(default_factory=list)
     """Origins of values that are not from the paper."""
 
+    def data(self) -> dict[str, Any]:
+        """The scenario as nested dicts and lists, with all defaults."""
+        return {key: value for key, value in asdict(self).items() if value is not None or key not in OPTIONAL}
+
     @property
     def digest(self) -> str:
         """SHA-256 of the scenario as nested dicts and lists in strict JSON, with all defaults and without spaces."""
-        text = json.dumps(self.as_data(), separators=(",", ":"), allow_nan=False)
+        text = json.dumps(self.data(), separators=(",", ":"), allow_nan=False)
         return sha256(text.encode())
-
-    def as_data(self) -> dict[str, Any]:
-        """The scenario as nested dicts and lists, with all defaults; a channel only if there is one."""
-        data = asdict(self)
-        return data if self.channel else {key: value for key, value in data.items() if key != "channel"}
 
     @property
     def barriers(self) -> dict[str, Obstacle]:
@@ -671,7 +695,9 @@ class Scenario:
     def key_of(self, name: str) -> str:
         """The key of a body in a scenario file; walls of the arena count as obstacles."""
         kind = self.kind_of(name)
-        return "uav" if kind == "uav" else MAP if name == MAP else f"{kind}s.{name}"
+        if name == MAP and kind == "obstacle" and name not in self.obstacles:
+            return MAP
+        return "uav" if kind == "uav" else f"{kind}s.{name}"
 
     @property
     def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:

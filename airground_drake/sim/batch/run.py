@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Sequence
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -12,9 +13,12 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError, described
 from airground_drake.base.registry import UAV_TASKS, method_of
+from airground_drake.model.bodies.motion import SAME_S, followed
 from airground_drake.model.law.task import Task
 from airground_drake.model.law.tasks import FormationTask
+from airground_drake.model.plants.delay import Delay
 from airground_drake.model.plants.first_order import FirstOrder
+from airground_drake.model.plants.lag import Lag
 from airground_drake.model.plants.scripted import Scripted
 from airground_drake.model.plants.steering import NUMBERS
 from airground_drake.model.plants.unicycle import Unicycle
@@ -38,6 +42,7 @@ from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, accepted_proposals, sightings
 from airground_drake.uav.planner import PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.answer import GatekeeperDecision
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 
 
@@ -48,24 +53,27 @@ class LeftToDrakeError(Exception):
 class Batch:
     """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
-    # Left to Drake: plants of users, lags and delays, channels, several UAVs, tasks of the UAV that are of users;
-    # monitors, observers, decision blocks and disturbances are no part of a scenario.
+    # Left to Drake: users' plants and controllers, channels, several UAVs, and tasks of the UAV that are not the
+    # package's; monitors, observers, decision blocks and disturbances are no part of a scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Set it up: everything that does not depend on the seed."""
         self.scenario, self.name = scenario, name
         run, given = scenario.runs[name], own(scenario, name)
+        self.given = given
         method, control = method_of(run.method), given.control
         self.world = world = make_world(given)
         n, r = len(world.names("ugv")), len(world.robots)
         for body in world.moving:
-            if not isinstance(body.plant, FirstOrder | Unicycle | Scripted):
+            if not isinstance(body.plant, FirstOrder | Unicycle | Lag | Delay | Scripted):
                 raise LeftToDrakeError(f"the plant of {body.name}")
         (flown_by, uav), *more = given.aerial.items()
         if given.channel is not None and method.intervenes:
             raise LeftToDrakeError("a channel")
         if more:
             raise LeftToDrakeError("several UAVs")
+        if given.ugv_controller is not None:
+            raise LeftToDrakeError(f"the controller {given.ugv_controller.kind} of the UGVs")
         if UAV_TASKS.load(uav.task, of=Task) is not FormationTask:
             raise LeftToDrakeError(f"the task {uav.task} of the UAV")
         presets = components.make_presets(given)
@@ -79,8 +87,11 @@ class Batch:
         breaks, places = components.stack_presets(presets)
         scripts = [vertices_of(body) for body in world.moving[r:]]
         gated, steering = self.gatekeepers is not None, world.steering
-        periods = {loop.PLAN: self.planner.period, **({loop.GATE: given.gatekeeper.period_s} if gated else {})}
-        ticks, due = _schedule(scenario.duration_s, control.period_s, noise.noise_period_s, periods)
+        periods = ((loop.PLAN, self.planner.period), *([(loop.GATE, given.gatekeeper.period_s)] if gated else []))
+        changes = tuple(
+            time for body in world.bodies for time in (body.appears_s, body.disappears_s) if 0.0 < time < np.inf
+        )
+        ticks, due = _schedule(scenario.duration_s, control.period_s, noise.noise_period_s, periods, changes)
         shortest = min(control.period_s, noise.noise_period_s)
         self.draws = int(scenario.duration_s / noise.noise_period_s) + 2
         self.team = Team(
@@ -106,15 +117,19 @@ class Batch:
             draws=np.zeros((0, n)),
             gated=gated,
             remembers=gated and not self.law.intervention_on_top,
-            watchful=any(body.appears_s > 0.0 or body.disappears_s < np.inf for body in world.bodies),
         )  # fmt: skip
         self.headings = np.array([
             body.plant.heading_rad if isinstance(body.plant, Unicycle) else 0.0 for body in world.bodies[:n]
         ])  # fmt: skip
         self.rows = int(1.3 * len(ticks)) + 400
-        sampling_s = [control.period_s, 0.0]
-        self.meta: dict[str, Any] = {
-            "zeta_m": float(zeta),
+        self.zeta = float(zeta)
+
+    @cached_property
+    def meta(self) -> dict[str, Any]:
+        """What only the simulation knows, for its traces."""
+        r, sampling_s = len(self.world.robots), [self.given.control.period_s, 0.0]
+        return {
+            "zeta_m": self.zeta,
             "controllers": {
                 "ugv_controller": of_ugvs(self.near.ugvs, self.law, r, sampling_s),
                 "uav_controller": read_back(self.near.uav, self._avoidance, r, sampling_s),
@@ -134,13 +149,18 @@ class Batch:
             SimulationError: if planner or gatekeeper stop the run; names it and the time.
             LeftToDrakeError: if the run ends in another error.
         """
+        return self.made(seed).trace()
+
+    def made(self, seed: int | None = None) -> Going:
+        """The run with a seed at its end; raises as `simulate`."""
         started = time.perf_counter()
         try:
             run = self.begin(seed)
             run.advance(self.scenario.duration_s)
         finally:
             self.database.close()
-        return run.trace(time.perf_counter() - started)
+        run.wall_s = time.perf_counter() - started
+        return run
 
     def begin(self, seed: int | None = None) -> Going:
         """A run at its initial state."""
@@ -193,6 +213,7 @@ class Going:
         self._executed: list[Proposal | None] = [None] * n
         self._accepted = _accepted(self._executed)
         self._ahead: PlannerState | None = None
+        self.wall_s = 0.0  # its duration by the clock, if it was made at one go
         self.advance(0.0)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -228,38 +249,68 @@ class Going:
             elif code == loop.PYTHON:
                 self._update()
             else:
-                raise LeftToDrakeError("the run ends in an error")
+                raise LeftToDrakeError("a run that ends in an error")
 
     def plan_ahead(self) -> None:
         """Plan for this instant, before its updates, which then take this result; the last one counts."""
         self._ahead = self._planned()
 
-    def trace(self, wall_s: float = 0.0) -> Trace:
-        """The trace of the run until now; `wall_s`: its duration by the clock."""
-        batch, rows = self._batch, int(self._state.counts[1])
-        log = Log(*(column[:rows] for column in self._log))
+    @property
+    def log(self) -> Log:
+        """The rows until now."""
+        return Log(*(column[: self._state.counts[1]] for column in self._log))
+
+    @property
+    def memory(self) -> PlannerState:
+        """What the planner remembers."""
+        return self._memory
+
+    @property
+    def decided(self) -> Sequence[GatekeeperDecision]:
+        """The decisions of the gatekeepers."""
+        return self._answering.made
+
+    def trace(self) -> Trace:
+        """The trace of the run until now."""
+        batch, log = self._batch, self.log
         logged = {
             "bodies": log.bodies, "team_command": log.command, "reference": log.reference, "noise": log.noise,
             "decision_variable": log.x, "status": log.status, "executing": log.executing,
         }  # fmt: skip
+        if batch.world.signals:
+            logged |= {"plant_signals": self._signals(log)}
         if self._team.turns:
-            logged |= {"plant_signals": log.signals, "command_share": log.share}
+            logged |= {"command_share": log.share}
         done = Done(
             t=log.t,
             logged={name: rows.T for name, rows in logged.items()},
-            memories={batch.planner.sender.uav: self._memory},
-            decided=self._answering.made,
+            memories={batch.planner.sender.uav: self.memory},
+            decided=self.decided,
             seed=self._seed,
             until_s=self.t,
-            wall_s=wall_s,
+            wall_s=self.wall_s,
             meta=batch.meta,
         )
         return trace_of(batch.scenario, batch.name, batch.world, done, batch.world.signals)
 
+    def _signals(self, log: Log) -> Array:
+        """What plants record, (T, k): of unicycles by the loop; all others do not act on the run, and follow now."""
+        batch, turning = self._batch, iter(np.split(log.signals, log.signals.shape[1] // loop.SIGNALS or 1, axis=1))
+        ticks = self._team.ticks[(self._team.due & loop.CONTROL) > 0]
+        samples = np.searchsorted(log.t, ticks[ticks <= log.t[-1]], side="right") - 1
+        return np.concatenate([
+            next(turning) if isinstance(body.plant, Unicycle)
+            else followed(
+                body.plant, log.t, log.bodies[:, 3 * i : 3 * i + 3], log.command[:, 3 * i : 3 * i + 3],
+                {*samples.tolist()}, batch.given.control.period_s,
+            )
+            for i, body in enumerate(batch.world.bodies[: len(batch.world.robots)]) if body.plant and body.plant.signals
+        ], axis=1)  # fmt: skip
+
     def _update(self) -> None:
         """Make the updates of an instant by planner and gatekeepers, which see what both remembered before."""
         batch, state, t = self._batch, self._state, self.t
-        if self._team.watchful:
+        if state.counts[3] & loop.WATCH:
             self._around = Around(*(batch.world.at(near, t) for near in batch.near))
         try:
             ahead, self._ahead = self._ahead, None
@@ -316,21 +367,30 @@ class Going:
         ]
 
 
+@lru_cache(maxsize=8)
 def _schedule(
-    duration_s: float, control_s: float, noise_s: float, periods: dict[int, float]
+    duration_s: float,
+    control_s: float,
+    noise_s: float,
+    periods: tuple[tuple[int, float], ...],
+    changes: tuple[float, ...],
 ) -> tuple[Array, loop.Ints]:
     """Times of all timed events, s, and what is due then: with Drake's own arithmetic, k times the period."""
     found: dict[float, int] = {}
     for bit, period in ((loop.CONTROL, control_s), (loop.NOISE, noise_s)):
         for k in range(int(duration_s / period) + 2):
             found[k * period] = found.get(k * period, 0) | bit
-    for bit, period in periods.items():
+    for bit, period in periods:
         ticks = Ticks(period, control_s)
         for k in range(int(duration_s / ticks.period) + 2):
             t = k * ticks.period
             found[t] = found.get(t, 0) | (bit if ticks.due(t) else 0)
+    samples = [k * control_s for k in range(int(duration_s / control_s) + 2)]
+    for time_s in (0.0, *changes) if changes else ():
+        for sample in [t for t in samples if t + SAME_S >= time_s][:1]:
+            found[sample] |= loop.WATCH
     times = sorted(found)
-    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)
+    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)  # nothing writes to them
 
 
 def _holds(breaks: Array, places: Array) -> Array:
