@@ -48,8 +48,8 @@ class LeftToDrakeError(Exception):
 class Batch:
     """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
-    # Left to Drake: users' plants and controllers, lags and delays, and tasks of the UAV that are not the package's;
-    # monitors, observers, decision blocks and disturbances are no part of a scenario.
+    # Left to Drake: users' plants and controllers, lags and delays, errors of measured positions, and tasks of the UAV
+    # that are not the package's; monitors, observers, decision blocks and disturbances are no part of a scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Set it up: everything that does not depend on the seed."""
@@ -61,6 +61,8 @@ class Batch:
         for body in world.moving:
             if not isinstance(body.plant, FirstOrder | Unicycle | Scripted):
                 raise LeftToDrakeError(f"the plant of {body.name}")
+        if given.sensing is not None:
+            raise LeftToDrakeError("errors of measured positions")
         if given.ugv_controller is not None:
             raise LeftToDrakeError(f"the controller {given.ugv_controller.kind} of the UGVs")
         if UAV_TASKS.load(given.uav.task, of=Task) is not FormationTask:
