@@ -29,7 +29,8 @@ def scenario_html(scenario: Scenario) -> str:
         for name, ugv in scenario.ugvs.items()
     ]
     told = [f"run {name}: ({run.method}) {METHODS[run.method].says}" for name, run in scenario.runs.items()]
-    listed = "".join(f"<li>{escape(line)}</li>" for line in (*ugvs, f"{scenario.uav.name}, the UAV", *told))
+    uavs = [f"{name}, the UAV" for name in scenario.aerial]
+    listed = "".join(f"<li>{escape(line)}</li>" for line in (*ugvs, *uavs, *told))
     title = f"<p><b>{escape(scenario.title or scenario.name)}</b> {escape(repr(scenario))}</p>"
     return f"{title}{_element(thumbnail(scenario))}<ul>{listed}</ul>"
 

@@ -282,8 +282,8 @@ def told(lie: Lie) -> Told:
         with_walls_and_persons(scenario, random)
     scenario.choices, scenario.runs, scenario.reproduction = [], {"d": Run(method="d")}, []
 
-    def lying(given: Scenario, method: Method) -> Planner:
-        honest = make_planner(given, method)
+    def lying(given: Scenario, method: Method, uav: str) -> Planner:
+        honest = make_planner(given, method, uav)
         parts = {f.name: getattr(honest, f.name) for f in fields(Planner)}
         return LyingPlanner(**parts, tactic=lie.tactic, random=random)
 

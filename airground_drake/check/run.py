@@ -16,7 +16,7 @@ from .rules import SMALL, Array, NotEstablished, close, holds, same
 from .scenario import Levels, Pair, Preset, as_run, levels_of, moving_of, pairs_of, places_of, preset_of, robots_of
 from .shapes import boxes_of
 
-SCHEMA = "airground_drake.trace/9"
+SCHEMA = "airground_drake.trace/10"
 # The tables that are read: positions, noise and triggers; commands and references at the control samples.
 TABLES = ("states.parquet", "samples.parquet")
 # Keys that meta.json and the run's entry in report.json share.
@@ -39,11 +39,6 @@ class Run:
     def ugvs(self) -> list[str]:
         """Names of the UGVs."""
         return list(self.scenario["ugvs"])
-
-    @cached_property
-    def uav(self) -> str:
-        """Name of the UAV."""
-        return str(self.scenario["uav"]["name"])
 
     @cached_property
     def robots(self) -> dict[str, Json]:

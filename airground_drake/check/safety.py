@@ -350,7 +350,7 @@ def _motion(run: Run) -> None:
             off = np.linalg.norm(run.seen_m(robot) - place[run.sample_row], axis=1)
             most = f"{run.error_m} m at most"
             holds("error of the measured position", off <= run.error_m, off, most, about=robot, t_s=run.sample_s)
-        if robot != run.uav:
+        if robot in run.ugvs:
             close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)
     for name in run.moving:
         rows = run.period_rows(name)

@@ -95,9 +95,14 @@ def as_run(scenario: Json, name: str) -> Json:
     return changed
 
 
+def uavs_of(scenario: Json) -> dict[str, Json]:
+    """Each UAV's part of the scenario, by name."""
+    return {scenario["uav"]["name"]: scenario["uav"]}
+
+
 def robots_of(scenario: Json) -> dict[str, Json]:
-    """Each robot's part of the scenario by name, the UGVs first, the UAV last."""
-    return {**scenario["ugvs"], scenario["uav"]["name"]: scenario["uav"]}
+    """Each robot's part of the scenario by name, the UGVs first."""
+    return scenario["ugvs"] | uavs_of(scenario)
 
 
 def barriers_of(scenario: Json) -> dict[str, Json]:
@@ -154,14 +159,14 @@ def expected_m_s(body: Json) -> float:
 
 def pairs_of(scenario: Json) -> list[Pair]:
     """Every robot with every obstacle, and every two robots once."""
-    uav, robots = scenario["uav"]["name"], robots_of(scenario)
+    uavs, robots = uavs_of(scenario), robots_of(scenario)
     limit = {name: float(robot["max_speed_m_s"]) for name, robot in robots.items()}
     safe = {kind: float(distance) for kind, distance in scenario["safe_distance"].items()}
     beside_obstacles = []
     for name, body in barriers_of(scenario).items():
         speed = expected_m_s(body)
         gap_m = float(body["distance_m"] or (speed and safe["moving_m"]) or safe["obstacle_m"])
-        for of, endless in ((scenario["ugvs"], True), ([uav], False)):
+        for of, endless in ((scenario["ugvs"], True), (uavs, False)):
             shape = shape_of(body, endless=endless)
             beside_obstacles += [
                 Pair(robot, name, gap_m, radii_m(robots[robot], body), limit[robot] + speed, 1.0, shape, speed)
@@ -169,7 +174,7 @@ def pairs_of(scenario: Json) -> list[Pair]:
             ]
     beside_robots = []
     for first, second in combinations(robots, 2):
-        gap_m = safe["air_ground_m" if second == uav else "ugv_m"]
+        gap_m = safe["air_ground_m" if second in uavs else "ugv_m"]
         radii = radii_m(robots[first], robots[second])
         beside_robots.append(Pair(first, second, gap_m, radii, limit[first] + limit[second], 0.5))
     room = {name: taken(robot, scenario["control"]) for name, robot in robots.items()}

@@ -181,8 +181,8 @@ class RunFacts:
         return [*self._scenario.ugvs]
 
     @property
-    def uav(self) -> str:
-        return self._scenario.uav.name
+    def uavs(self) -> list[str]:
+        return [*self._scenario.aerial]
 
     @property
     def ends_too_early(self) -> bool:

@@ -179,8 +179,9 @@ def _arrived(run: RunFacts) -> Cell:
     away = [ugv for ugv in run.ugvs if ugv not in run.home]
     if not away:
         last = max((run.arrived_s.get(ugv, 0.0) for ugv in run.ugvs), default=0.0)
-        uav = [] if run.uav in run.home else ["the UAV did not"]
-        return Cell("partly" if uav else "yes", [f"{count}, by {last:.1f} s", *uav])
+        astray = [uav for uav in run.uavs if uav not in run.home]
+        told = ["the UAV did not"] if astray == run.uavs else [f"{_named(astray)} did not"] if astray else []
+        return Cell("partly" if astray else "yes", [f"{count}, by {last:.1f} s", *told])
     goal = run.claim(rules.ARRIVAL)
     as_declared = " (as declared)" if goal.as_expected is True else ""
     ends = [*grouped((run.ending(ugv), ugv) for ugv in away).items()]

@@ -96,9 +96,8 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
             kind = "moving" if barrier.expected_speed_m_s else "obstacle"
             yield of_pair(first, name, kind, gap_m(scenario, barrier), radius[first] + barrier.radius_m)
     for first, second in combinations(scenario.robots, 2):
-        with_uav = scenario.uav.name in (first, second)
-        promised = safe.air_ground_m if with_uav else safe.ugv_m
-        yield of_pair(first, second, "air_ground" if with_uav else "ugv", promised, radius[first] + radius[second])
+        kind = scenario.pair_of(first, second)
+        yield of_pair(first, second, kind, getattr(safe, f"{kind}_m"), radius[first] + radius[second])
 
 
 def _start(robot: Bounds, promised_m: float, gap_m: float) -> str:

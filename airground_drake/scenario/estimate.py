@@ -123,13 +123,13 @@ def _of_run(scenario: Scenario, run: Run) -> Estimate:
     h = scenario.control.period_s
     duration = scenario.duration_s
     n = len(scenario.ugvs)
-    m = len(scenario.obstacles) + len(scenario.uav.phantoms_m)
-    points, by_outcome = n + m, not METHODS[run.method].intervention_on_top
+    points, by_outcome = n + _discs(scenario), not METHODS[run.method].intervention_on_top
+    robots = len(scenario.robots)
     rows = duration / min(h, scenario.decision.noise_period_s) + 1.0
-    columns = 1 + 6 * (n + 1) + 10 * n
-    memory = FLOAT * COPIES * rows * (columns + (n + 1) * points)
+    columns = 1 + 6 * robots + 10 * n
+    memory = FLOAT * COPIES * rows * (columns + robots * points)
     if not METHODS[run.method].gated:
-        return Estimate(rows, (n + 1) * rows, 0.0, 0.0, 0.0, memory)
+        return Estimate(rows, robots * rows, 0.0, 0.0, 0.0, memory)
 
     decisions = n * (duration / gate.period_s + 1.0)
     periods = ((gate.longest_s + gate.settling_s) if by_outcome else gate.horizon_s) / h
@@ -138,12 +138,16 @@ def _of_run(scenario: Scenario, run: Run) -> Estimate:
     problem = 0.0 if by_outcome else FLOAT * gate.stages * (18 + 6 * points) + prediction
     memory += decisions * (OF_A_DECISION + problem) + 2.0 * prediction
     searched = 0.0 if by_outcome else decisions * (SEARCHED + SEARCHED_POINT * points)
-    return Estimate(rows, (n + 1) * rows, decisions, judged * 2.0 * periods * points, searched, memory)
+    return Estimate(rows, robots * rows, decisions, judged * 2.0 * periods * points, searched, memory)
+
+
+def _discs(scenario: Scenario) -> int:
+    """Obstacles and phantoms."""
+    return len(scenario.obstacles) + sum(len(uav.phantoms_m) for uav in scenario.aerial.values())
 
 
 def _planning(scenario: Scenario) -> float:
     """Bytes for a shortest path among all discs, if a run plans any: two discs have four tangents."""
     if not any(METHODS[run.method].intervenes for run in scenario.runs.values()):
         return 0.0
-    discs = len(scenario.ugvs) + len(scenario.obstacles) + len(scenario.uav.phantoms_m)
-    return 2.0 * OF_A_TANGENT * math.pow(discs, 2)
+    return 2.0 * OF_A_TANGENT * math.pow(len(scenario.ugvs) + _discs(scenario), 2)

@@ -19,7 +19,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenario import map_file, validate
 from airground_drake.scenario.document import Document, of_data, place_of, put, read, replace, simple, way
 from airground_drake.scenario.filled import filled
-from airground_drake.scenario.schema import SET, Scenario, Vector
+from airground_drake.scenario.schema import SET, Scenario, Uav, Vector
 from airground_drake.scenario.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
@@ -131,7 +131,11 @@ class Chosen(NamedTuple):
 def _choices(document: Document) -> list[Chosen]:
     listed = document.data.get("choices") if isinstance(document.data, dict) else None
     entries = [entry for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
-    return [Chosen(entry, dict(entry), deepcopy(way(document.data, str(entry.get("key"))))) for entry in entries]
+    ways = [way(document.data, str(entry.get("key"))) for entry in entries]
+    return [
+        Chosen(entry, dict(entry), [*passed[:-1], *deepcopy(passed[-1:])])
+        for entry, passed in zip(entries, ways, strict=True)
+    ]
 
 
 def _mark_set(document: Document, before: Sequence[Chosen]) -> None:
@@ -180,9 +184,9 @@ def _checked(document: Document) -> Scenario:
 
 
 def _complete(scenario: Scenario) -> None:
-    """Fill in the UAV's target if it is left out, and round gains of 1/period down so that gain * period <= 1."""
-    if not scenario.uav.target_m:
-        scenario.uav.target_m = _over_the_targets(scenario)
+    """Fill in UAVs' targets that are left out, and round gains of 1/period down so that gain * period <= 1."""
+    for uav in scenario.aerial.values():
+        uav.target_m = uav.target_m or _over_the_targets(scenario, uav)
     control = scenario.control
     for name in validate.GAINS:
         setattr(control, name, _rounded_down(getattr(control, name), control.period_s))
@@ -208,11 +212,11 @@ def _rounded_down(gain: float, period: float) -> float:
     return gain
 
 
-def _over_the_targets(scenario: Scenario) -> Vector:
-    """Where the UAV's task (9) leads when every UGV is at its target: over the centroid, [x, y, z], m."""
+def _over_the_targets(scenario: Scenario, uav: Uav) -> Vector:
+    """Where a UAV's task (9) leads when every UGV is at its target: over the centroid, [x, y, z], m."""
     targets = [ugv.target_m for ugv in scenario.ugvs.values()]
     x, y = (sum(target[axis] for target in targets) / len(targets) for axis in range(2))
-    return [x, y, scenario.uav.altitude_m]
+    return [x, y, uav.altitude_m]
 
 
 def _put(document: Document, key: str, value: Any) -> None:

@@ -37,14 +37,13 @@ WANTED = f"third-party code is imported and run only with {OPTION}"
 def plugins(scenario: Scenario) -> dict[str, str]:
     """Names of third-party code in a scenario, by key; entry points of installed packages are not among them."""
     named: list[tuple[str, str, Registry]] = [
-        ("uav.task", scenario.uav.task, UAV_TASKS),
-        ("gatekeeper.route", scenario.gatekeeper.route, ROUTES),
+        (f"{scenario.key_of(name)}.task", uav.task, UAV_TASKS) for name, uav in scenario.aerial.items()
     ]
+    named.append(("gatekeeper.route", scenario.gatekeeper.route, ROUTES))
     if scenario.ugv_controller is not None:
         named.append(("ugv_controller.kind", scenario.ugv_controller.kind, UGV_CONTROLLERS))
     for name, robot in scenario.robots.items():
-        place = f"{f'ugvs.{name}' if name in scenario.ugvs else 'uav'}.plant"
-        named += [(f"{place}.kind", plant.kind, PLANTS) for plant in robot.plant]
+        named += [(f"{scenario.key_of(name)}.plant.kind", plant.kind, PLANTS) for plant in robot.plant]
     for index, policy in enumerate(scenario.intervention.policies):
         named.append((f"intervention.policies.{index}.name", policy.name, POLICIES))
     for run, spec in scenario.runs.items():

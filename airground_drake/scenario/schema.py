@@ -36,6 +36,7 @@ from airground_drake.base.values import (
     Words,
     YesNo,
 )
+from airground_drake.model.bodies.world import Kind
 from airground_drake.scenario.kinds import (
     CLAIMS,
     AirPoint,
@@ -644,9 +645,40 @@ class Scenario:
         return bodies
 
     @property
+    def aerial(self) -> dict[str, Uav]:
+        """The UAVs, by name."""
+        return {self.uav.name: self.uav}
+
+    @property
     def robots(self) -> dict[str, Ugv | Uav]:
-        """The UGVs and then the UAV, by name."""
-        return {**self.ugvs, self.uav.name: self.uav}
+        """The UGVs and then the UAVs, by name."""
+        return {**self.ugvs, **self.aerial}
+
+    def kind_of(self, name: str) -> Kind:
+        """What the body of this name is.
+
+        Raises:
+            KeyError: if there is no such body.
+        """
+        if name in self.ugvs:
+            return "ugv"
+        if name in self.aerial:
+            return "uav"
+        if name in self.obstacles or name in self.barriers:
+            return "obstacle"
+        raise KeyError(name)
+
+    def pair_of(self, first: str, second: str) -> str:
+        """The kind of a pair of robots: `ugv` or `air_ground`; with `_m` the key of its safe distance."""
+        kinds = {self.kind_of(first), self.kind_of(second)}
+        return "air_ground" if len(kinds) == 2 else kinds.pop()
+
+    def key_of(self, name: str) -> str:
+        """The key of a body in a scenario file; walls of the arena count as obstacles."""
+        kind = self.kind_of(name)
+        if name == MAP and kind == "obstacle" and name not in self.obstacles:
+            return MAP
+        return "uav" if kind == "uav" else f"{kind}s.{name}"
 
     @property
     def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:

@@ -61,7 +61,7 @@ def _names(scenario: Scenario) -> Problems:
 
 def _reserved(scenario: Scenario) -> Problems:
     for name in (*scenario.robots, *scenario.obstacles):
-        key = f"ugvs.{name}" if name in scenario.ugvs else f"obstacles.{name}" if name in scenario.obstacles else "uav"
+        key = scenario.key_of(name)
         if name.startswith(ARENA):
             yield key, name, f"a name that does not begin with {ARENA}: these are the walls of arena_m"
         if name == MAP or name.startswith(f"{MAP}_"):
@@ -105,11 +105,12 @@ def _shapes(scenario: Scenario) -> Problems:
         yield "arena_m", scenario.arena_m, "two opposite corners of a rectangle"
     elif scenario.arena_m:
         low, high = np.min(scenario.arena_m, axis=0), np.max(scenario.arena_m, axis=0)
-        for key, robot in (*((f"ugvs.{name}", ugv) for name, ugv in scenario.ugvs.items()), ("uav", scenario.uav)):
-            for name in ("start_m", "target_m"):
-                place = np.array(getattr(robot, name)[:2])
+        for name, robot in scenario.robots.items():
+            for key in ("start_m", "target_m"):
+                place = np.array(getattr(robot, key)[:2])
                 if not ((low < place) & (place < high)).all():
-                    yield f"{key}.{name}", getattr(robot, name), f"a place within arena_m = {scenario.arena_m}"
+                    allowed = f"a place within arena_m = {scenario.arena_m}"
+                    yield f"{scenario.key_of(name)}.{key}", getattr(robot, key), allowed
 
 
 def _way(key: str, obstacle: Obstacle, *, flat: bool) -> Problems:
@@ -190,8 +191,7 @@ def _plants(scenario: Scenario) -> Problems:
     """Plants are combined as theorems combine them, and their keys go together."""
     control = scenario.control
     for name, robot in scenario.robots.items():
-        flies = name not in scenario.ugvs
-        place = f"{'uav' if flies else f'ugvs.{name}'}.plant"
+        flies, place = scenario.kind_of(name) == "uav", f"{scenario.key_of(name)}.plant"
         if allowed := refusal(robot.plant):
             yield place, f"[{', '.join(keys.kind for keys in robot.plant)}]", allowed
         setting = Setting(control.period_s, control.avoidance_gain_1_s, robot.max_speed_m_s, flies)
@@ -279,7 +279,7 @@ def _release(scenario: Scenario) -> Problems:
 
 
 def _distances(scenario: Scenario) -> Problems:
-    safe, altitude = scenario.safe_distance, scenario.uav.altitude_m
+    safe = scenario.safe_distance
     for name in ("obstacle_m", "ugv_m", "air_ground_m", *(["moving_m"] if safe.moving_m else [])):
         if not safe.collision_m < getattr(safe, name):
             allowed = f"less than safe_distance.{name} = {getattr(safe, name):.9g} m"
@@ -287,11 +287,13 @@ def _distances(scenario: Scenario) -> Problems:
     for name, body in scenario.barriers.items():
         if body.distance_m and not safe.collision_m < body.distance_m:
             allowed = f"more than safe_distance.collision_m = {safe.collision_m:.9g} m, or 0"
-            yield f"{_key_of(name)}.distance_m", body.distance_m, allowed
-    radii = scenario.uav.radius_m + max(ugv.radius_m for ugv in scenario.ugvs.values())
-    if not altitude > safe.air_ground_m + radii:
-        least = f"safe_distance.air_ground_m = {safe.air_ground_m:.9g} m{_and(radii)}"
-        yield "uav.altitude_m", altitude, f"more than {least}, for the UAV to fly over a UGV"
+            yield f"{scenario.key_of(name)}.distance_m", body.distance_m, allowed
+    for name, uav in scenario.aerial.items():
+        radii = uav.radius_m + max(ugv.radius_m for ugv in scenario.ugvs.values())
+        if not uav.altitude_m > safe.air_ground_m + radii:
+            least = f"safe_distance.air_ground_m = {safe.air_ground_m:.9g} m{_and(radii)}"
+            key = f"{scenario.key_of(name)}.altitude_m"
+            yield key, uav.altitude_m, f"more than {least}, for the UAV to fly over a UGV"
 
 
 def _and(radii: float) -> str:
@@ -315,14 +317,9 @@ def apart_of(scenario: Scenario, name: str) -> Apart:
     """The distance to keep from an obstacle."""
     obstacle = scenario.barriers[name]
     if obstacle.distance_m:
-        return f"{_key_of(name)}.distance_m", obstacle.distance_m
+        return f"{scenario.key_of(name)}.distance_m", obstacle.distance_m
     moving = obstacle.expected_speed_m_s and scenario.safe_distance.moving_m
     return _apart(scenario, "moving_m" if moving else "obstacle_m")
-
-
-def _key_of(barrier: str) -> str:
-    """The key of an obstacle or of the map; walls of the arena count as obstacles."""
-    return MAP if barrier == MAP else f"obstacles.{barrier}"
 
 
 def _apart(scenario: Scenario, kind: str) -> Apart:
@@ -332,17 +329,22 @@ def _apart(scenario: Scenario, kind: str) -> Apart:
 def _nearest_pairs(scenario: Scenario) -> list[tuple[Apart, _Body, _Body]]:
     """For each kind of pairs the pair that needs the most room in a period, with its safe distance."""
     h = scenario.control.period_s
-    *ugvs, uav = (
-        _Body(robot.radius_m + robot.max_speed_m_s * h, robot.max_speed_m_s, robot.radius_m, name)
-        for name, robot in scenario.robots.items()
+    ugvs, uavs = (
+        sorted(
+            (
+                _Body(robot.radius_m + robot.max_speed_m_s * h, robot.max_speed_m_s, robot.radius_m, name)
+                for name, robot in robots.items()
+            ),
+            reverse=True,
+        )
+        for robots in (scenario.ugvs, scenario.aerial)
     )
-    ugvs.sort(reverse=True)
     fixed = [
         _Body(body.radius_m, body.expected_speed_m_s, body.radius_m, name) for name, body in scenario.barriers.items()
     ]
-    pairs = [(_apart(scenario, "air_ground_m"), uav, ugvs[0])]
+    pairs = [(_apart(scenario, "air_ground_m"), uavs[0], ugvs[0])]
     pairs += [(_apart(scenario, "ugv_m"), first, second) for first, second in pairwise(ugvs[:2])]
-    return [*pairs, *((apart_of(scenario, body.name), max(uav, ugvs[0]), body) for body in fixed)]
+    return [*pairs, *((apart_of(scenario, body.name), max(uavs[0], ugvs[0]), body) for body in fixed)]
 
 
 def _shown(number: Fraction, rounding: str) -> str:
@@ -381,7 +383,7 @@ def _extent(scenario: Scenario) -> Problems:
     for name, ugv in scenario.ugvs.items():
         points += [(f"ugvs.{name}.start_m", ugv.start_m), (f"ugvs.{name}.target_m", ugv.target_m)]
         points += [(f"ugvs.{name}.preset.waypoints_m.{i}", place) for i, place in enumerate(ugv.preset.waypoints_m)]
-    points.append(("uav.start_m", scenario.uav.start_m))
+    points += [(f"{scenario.key_of(name)}.start_m", uav.start_m) for name, uav in scenario.aerial.items()]
     for name, body in scenario.barriers.items():
         shape = next((key for key in SHAPES if getattr(body, key)), "position_m")
         corners = outlines_of(scenario, body)[:, outline.CORNERS :].reshape(-1, 2)  # and zeros
@@ -390,7 +392,7 @@ def _extent(scenario: Scenario) -> Problems:
             places.append(body.position_m)
         if body.moves:
             shape, places = "moves.waypoints_m", [*places, *body.moves.waypoints_m]
-        key = f"{_key_of(name)}.{'file' if name == MAP else shape}"
+        key = f"{scenario.key_of(name)}.{'file' if name == MAP else shape}"
         points += [("arena_m" if name.startswith(ARENA) else key, place) for place in places]
     key, point = max(points, key=lambda entry: max(map(abs, entry[1])))
     farthest = max(map(abs, point))
@@ -438,21 +440,25 @@ def _clearances(scenario: Scenario) -> Problems:
     """No robot may start or end within the safe distance of an obstacle or of another robot."""
     outlines = {name: outlines_of(scenario, body) for name, body in scenario.barriers.items()}
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
-        ugvs = [
-            _Round(f"ugvs.{name}", name, getattr(ugv, attribute), ugv.radius_m) for name, ugv in scenario.ugvs.items()
-        ]
-        uav = _Round("uav", scenario.uav.name, getattr(scenario.uav, attribute), scenario.uav.radius_m)
+        ugvs, uavs = (
+            [
+                _Round(scenario.key_of(name), name, getattr(robot, attribute), robot.radius_m)
+                for name, robot in robots.items()
+            ]
+            for robots in (scenario.ugvs, scenario.aerial)
+        )
         for name, rows in outlines.items():
             if scenario.barriers[name].moves or (scenario.barriers[name].appears_s and attribute == "start_m"):
                 continue  # where robots are when it comes or appears is judged in each run
             kind, least = apart_of(scenario, name)
-            for robot in (*ugvs, uav):
-                apart = convex.distances(rows, np.array(robot.point), robot is not uav) - rows[:, outline.RADIUS]
+            for robot in (*ugvs, *uavs):
+                planar = robot not in uavs
+                apart = convex.distances(rows, np.array(robot.point), planar) - rows[:, outline.RADIUS]
                 gap = float(apart.min()) - robot.radius
                 if gap < least - TOLERANCE:
                     what = f"{verb} {gap:.9g} m from {name}{_filled(scenario) if name == MAP else ''}"
                     yield _too_near(robot, attribute, what, kind, least)
-        for robots, others, kind in ((ugvs, ugvs, "ugv_m"), ([uav], ugvs, "air_ground_m")):
+        for robots, others, kind in ((ugvs, ugvs, "ugv_m"), (uavs, ugvs, "air_ground_m")):
             least = getattr(scenario.safe_distance, kind)
             for robot, other in _within(robots, others, least - TOLERANCE):
                 gap = math.dist(robot.point, other.point) - (robot.radius + other.radius)
@@ -517,7 +523,7 @@ def _budget(scenario: Scenario) -> Problems:
     for pair in budget(scenario):
         if not pair.terms:
             continue
-        key = f"ugvs.{pair.first}" if pair.first in scenario.ugvs else "uav"
+        key = scenario.key_of(pair.first)
         needs = (
             f"{pair.promised_m:.2f} m between {pair.first} and {pair.second} needs {pair.gap_m:.2f} m in the law "
             f"({pair.in_words()})"
@@ -537,12 +543,10 @@ def _budget(scenario: Scenario) -> Problems:
                 f"control.sensing_range_m must be at least {reach + TOLERANCE:.9g} m. Largest term: {pair.largest}"
             )
             yield key, Fault(needs), allowed
-        if pair.kind == "air_ground" and not scenario.uav.altitude_m > pair.law_m:
-            yield (
-                key,
-                Fault(needs),
-                f"uav.altitude_m must be more than {pair.law_m:.9g} m. Largest term: {pair.largest}",
-            )
+        uav = scenario.aerial.get(pair.second)
+        if uav and pair.kind == "air_ground" and not uav.altitude_m > pair.law_m:
+            above = f"{scenario.key_of(pair.second)}.altitude_m must be more than {pair.law_m:.9g} m"
+            yield key, Fault(needs), f"{above}. Largest term: {pair.largest}"
 
 
 def _apart_m(scenario: Scenario, places: dict[str, Array], pair: PairBudget, outlines: dict[str, Array]) -> float:
@@ -560,7 +564,7 @@ def _reproduction(scenario: Scenario) -> Problems:
         if not row.id or count[row.id] > 1:
             yield f"{key}.id", row.id, "an identifier that no other row has"
         yield from _one_of(f"{key}.run", row.run, scenario.runs, "one of the runs")
-        yield from _one_of(f"{key}.robot", row.robot, (*scenario.ugvs, scenario.uav.name), "one of the robots")
+        yield from _one_of(f"{key}.robot", row.robot, scenario.robots, "one of the robots")
 
 
 def _choices(scenario: Scenario) -> Problems:

@@ -21,7 +21,7 @@ def make_world(scenario: Scenario) -> World:
     control = scenario.control
     about = control.period_s, scenario.position_error_m
     robots = [_robot(name, "ugv", ugv, *about) for name, ugv in scenario.ugvs.items()]
-    robots += [_robot(scenario.uav.name, "uav", scenario.uav, *about)]
+    robots += [_robot(name, "uav", uav, *about) for name, uav in scenario.aerial.items()]
     obstacles = [_obstacle(scenario, name, body) for name, body in scenario.barriers.items()]
     obstacles.sort(key=lambda body: body.plant is None)
     apart: dict[frozenset[Kind], float] = {

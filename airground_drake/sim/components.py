@@ -22,10 +22,10 @@ from airground_drake.scenario.budget import budget, takes_room
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
-from airground_drake.scenario.schema import Decision, Scenario
+from airground_drake.scenario.schema import Decision, Scenario, Uav
 from airground_drake.scenario.world import make_world
 from airground_drake.uav.database import BehaviourDatabase, make_policy
-from airground_drake.uav.planner import Mover, Planner
+from airground_drake.uav.planner import Mover, Planner, Sender
 from airground_drake.ugv.answer import Rules
 from airground_drake.ugv.budget import Budget
 from airground_drake.ugv.drake_solvers import SOLVERS, lacking
@@ -53,9 +53,9 @@ def make_law(scenario: Scenario, method: Method, composition: Composition = "aug
     return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
 
 
-def make_planner(scenario: Scenario, method: Method) -> Planner:
-    """The UAV's planner with its policies (none under a method without interventions) and its map."""
-    mapped, appears, disappears = make_map(scenario)
+def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:
+    """The planner of a UAV with its policies (none under a method without interventions) and its map."""
+    mapped, appears, disappears = make_map(scenario, scenario.aerial[uav])
     given = scenario.intervention
     policies = given.policies if method.intervenes else []
     radius, apart = _planned_apart(scenario)
@@ -83,6 +83,7 @@ def make_planner(scenario: Scenario, method: Method) -> Planner:
         trails=tuple(
             plant_of(ugv, scenario.control.period_s).trails(ugv.max_speed_m_s) for ugv in scenario.ugvs.values()
         ),
+        sender=Sender(uav, first=[*scenario.aerial].index(uav), step=len(scenario.aerial)),
     )
 
 
@@ -102,12 +103,12 @@ def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
     return radius, scenario.safe_distance.ugv_m + between
 
 
-def make_map(scenario: Scenario) -> tuple[Array, Array, Array]:
-    """The UAV's map: obstacles at rest that it knows, and phantoms, which exist on the map only and have no radius."""
+def make_map(scenario: Scenario, uav: Uav) -> tuple[Array, Array, Array]:
+    """A UAV's map: obstacles at rest that it knows, and phantoms, which exist on the map only and have no radius."""
     # Returns outlines, (m, W), see `model.geometry.outline`, and when each appears and disappears, (m,), s.
     known = [barrier for barrier in scenario.barriers.values() if barrier.known_to_uav and not barrier.moves]
     parts = [outlines_of(scenario, obstacle) for obstacle in known]
-    phantoms = outline.balls(scenario.uav.phantoms_m, gap=scenario.safe_distance.obstacle_m)
+    phantoms = outline.balls(uav.phantoms_m, gap=scenario.safe_distance.obstacle_m)
     count = [*map(len, parts), len(phantoms)]
     appears = np.repeat([*(barrier.appears_s for barrier in known), 0.0], count)
     disappears = np.repeat([*(barrier.disappears_s or np.inf for barrier in known), np.inf], count)

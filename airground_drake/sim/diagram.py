@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
+import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Multiplexer, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, UnknownNameError, short
 from airground_drake.base.registry import METHODS, UAV_TASKS, Method, method_of
 from airground_drake.model.bodies.world import ROBOTS, World
@@ -65,9 +67,9 @@ class Model:
     world: World  # all bodies, in the order of the port `bodies`
     decision_block: System  # drives the trigger
     trigger: EventTrigger  # of all UGVs
-    planner: InterventionPlanner  # the UAV's planner
+    planners: Mapping[str, InterventionPlanner]  # of each UAV, by its name
     gatekeeper: Gatekeeper | None  # of methods (c) and (d), else None
-    controllers: tuple[UgvController | OwnUgvController, UavController]  # of the UGVs, and of the UAV
+    controllers: tuple[UgvController | OwnUgvController | UavController, ...]  # of the UGVs, and of each UAV
     signals: tuple[str, ...]  # names of the columns of `plant_signals` and `own_headings`
     recorded: tuple[str, ...]  # names of the exported output ports that are the signals of a trace
 
@@ -140,7 +142,10 @@ def build_model(
     made = {body.name: plant_system(body, scenario.control.period_s, plants) for body in world.moving}
     signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))
     vehicles = _vehicles(world, made, disturbed=disturbed)
-    planner = InterventionPlanner(components.make_planner(scenario, chosen), world, scenario.control.period_s)
+    planners = {
+        uav: InterventionPlanner(components.make_planner(scenario, chosen, uav), world, scenario.control.period_s)
+        for uav in scenario.aerial
+    }
     gatekeeper = None
     if chosen.gated:
         periods = {"period": scenario.gatekeeper.period_s, "control": scenario.control.period_s}
@@ -149,12 +154,12 @@ def build_model(
     answers = {name: answering.GetOutputPort(name) for name in ("answers", "reports")}
     own = scenario.ugv_controller
     ugvs = OwnUgvController(own, world, law, ugv_controller) if own else UgvController(world, law)
-    controllers = ugvs, _uav_controller(scenario, world)
+    uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
     # input ports of the parts for which `bodies` are positions as measured
     measured = {"bodies": "published"} if scenario.sensing else {}
     parts = {
         "decision_making": decision,
-        "task_planning": _task_planning(presets, planner, *controllers, measured=measured),
+        "task_planning": _task_planning(presets, planners, ugvs, uavs, measured),
         "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers, renamed={answering: measured}),
         "vehicles": vehicles,
     }
@@ -173,9 +178,9 @@ def build_model(
         world=world,
         decision_block=block,
         trigger=trigger,
-        planner=planner,
+        planners=planners,
         gatekeeper=gatekeeper,
-        controllers=controllers,
+        controllers=(ugvs, *uavs.values()),
         signals=signals,
         recorded=recorded,
     )
@@ -218,18 +223,19 @@ def _decision_making(scenario: Scenario, n: int, variable: System, events: Event
 
 def _task_planning(
     presets: Sequence[Motion],
-    planner: InterventionPlanner,
+    planners: Mapping[str, InterventionPlanner],
     ugvs: UgvController | OwnUgvController,
-    uav: UavController,
-    *,
+    uavs: Mapping[str, UavController],
     measured: Mapping[str, str],
 ) -> Diagram:
-    """The task planning layer: preset trajectories, planner, controllers."""
+    """The task planning layer: preset trajectories, planners, controllers."""
     times, places = components.stack_presets(list(presets))
     reference = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T), output_derivative_order=1)
-    systems = {
-        "reference": reference, "intervention_planner": planner, "ugv_controller": ugvs, "uav_controller": uav,
-    }  # fmt: skip
+    systems: dict[str, System] = {"reference": reference}
+    systems |= {name: planners[uav] for uav, name in _named("intervention_planner", planners).items()}
+    systems |= {"ugv_controller": ugvs}
+    systems |= {name: uavs[uav] for uav, name in _named("uav_controller", uavs).items()}
+    (planner,), (uav,) = planners.values(), uavs.values()
     named = {
         "reference": reference.get_output_port(),
         "proposals": planner.GetOutputPort("proposals"),
@@ -239,8 +245,15 @@ def _task_planning(
         "gains": ugvs.GetOutputPort("gains"),
         "uav_command": uav.GetOutputPort("command"),
     }
-    renamed = {ugvs: measured, uav: measured, planner: dict.fromkeys(measured, "seen_by_uav")}
+    renamed: dict[System, Mapping[str, str]] = dict.fromkeys([ugvs, *uavs.values()], measured)
+    renamed |= dict.fromkeys(planners.values(), dict.fromkeys(measured, "seen_by_uav"))
     return _assembled("task_planning", systems, named, renamed=renamed)
+
+
+def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:
+    """Names of a block of each UAV: that of the block, and with several UAVs of the UAV."""
+    names = [*uavs]
+    return {uav: block if len(names) == 1 else f"{block}_{uav}" for uav in names}
 
 
 def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) -> Diagram:
@@ -357,17 +370,23 @@ def make_monitor(
     chosen, composition = _chosen(scenario, method, composition)
     world = make_world(scenario)
     ugvs = UgvController(world, components.make_law(scenario, chosen, composition))
-    laws = Laws(ugvs.velocity, _uav_controller(scenario, world).velocity)
-    return Monitor(world, components.make_avoidance(scenario), laws, terminate=terminate)
+    uavs = [_uav_controller(scenario, world, uav) for uav in scenario.aerial]
+
+    def of_uavs(t: float, positions: Array, commands: Array) -> Array:
+        return np.stack([uav.velocity(t, positions, commands) for uav in uavs])
+
+    return Monitor(world, components.make_avoidance(scenario), Laws(ugvs.velocity, of_uavs), terminate=terminate)
 
 
-def _uav_controller(scenario: Scenario, world: World) -> UavController:
+def _uav_controller(scenario: Scenario, world: World, name: str) -> UavController:
+    uav = scenario.aerial[name]
     return UavController(
         world,
         components.make_avoidance(scenario),
-        task=UAV_TASKS.load(scenario.uav.task, of=Task),
+        uav=name,
+        task=UAV_TASKS.load(uav.task, of=Task),
         gain=scenario.control.formation_gain_1_s,
-        altitude=scenario.uav.altitude_m,
+        altitude=uav.altitude_m,
     )
 
 

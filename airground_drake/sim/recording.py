@@ -42,7 +42,7 @@ class Done(NamedTuple):
 
     t: Array  # times, (T,), s
     logged: Mapping[str, Array]  # the signals of a trace by name, see `sim.diagram`, (k, T)
-    memory: PlannerState
+    memories: Mapping[str, PlannerState]  # what each UAV's planner remembers
     decided: Sequence[GatekeeperDecision]
     seed: int
     until_s: float
@@ -58,7 +58,7 @@ def trace_of(
     scenario: Scenario, name: str, world: World, done: Done, signals: Sequence[str], own_plants: Collection[str] = ()
 ) -> Trace:
     """The trace of a run of a scenario; `signals` as of `states`, `own_plants` are robots with users' plants."""
-    run, ugvs, uav = scenario.runs[name], world.names("ugv"), world.names("uav")[0]
+    run, ugvs = scenario.runs[name], world.names("ugv")
     given = replace(own(scenario, name), duration_s=done.until_s)
     keep = distinct(done.t, done.logged["team_command"])
     t, logged = done.t[keep], {port: rows[:, keep] for port, rows in done.logged.items()}
@@ -75,7 +75,7 @@ def trace_of(
         "scenario": resolved(scenario) | {"duration_s": done.until_s},
         "events": [],
         **done.meta,
-        "faults": faults(done.memory.asked),
+        "faults": faults(done.memories),
     }
     trace = Trace(
         meta,
@@ -84,10 +84,10 @@ def trace_of(
         decisions=decisions(done.decided, ugvs, given.gatekeeper.route),
         timings={"wall_s": done.wall_s, "decision_times_s": [decision.cpu_s for decision in done.decided]},
         problems=problems(done.decided),
-        proposals=proposals(ugvs, done.memory.sent),
-        plans=plans(done.memory.asked, done.memory.sent, ugvs, uav),
+        proposals=proposals(ugvs, done.memories.values()),
+        plans=plans(done.memories, ugvs),
     )
-    trace = replace(trace, messages=messages(done.memory, trace, uav))
+    trace = replace(trace, messages=messages(done.memories.values(), trace))
     trace.derived("scenario", lambda: given)  # it need not be read from the metadata
     meta["events"] = extract(trace)
     return trace
@@ -248,33 +248,44 @@ def problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:
     return listed(rows, (*PROBLEM_SCALARS, *PROBLEM_ARRAYS))
 
 
-def proposals(ugvs: Sequence[str], sent: Sequence[tuple[int, Proposal]]) -> pd.DataFrame:
-    """`Trace.proposals` of the proposals sent, each with the index of its UGV."""
+def _sent(memories: Iterable[PlannerState]) -> list[tuple[int, Proposal]]:
+    """All proposals with the index of their UGV, by time of sending."""
+    return sorted((sent for memory in memories for sent in memory.sent), key=lambda sent: sent[1].issued)
+
+
+def proposals(ugvs: Sequence[str], memories: Iterable[PlannerState]) -> pd.DataFrame:
+    """`Trace.proposals` of what planners remember."""
     rows = [
         (
             proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
             proposal.motion.positions.ravel().tolist(),
             np.asarray(proposal.selection, dtype=np.float64).ravel().tolist(),
             [number for row in proposal.mapped for number in outline.as_tuple(row)], proposal.cause or ugvs[i],
-            [float(ugvs.index(name)) for name in proposal.party],
+            [float(ugvs.index(name)) for name in proposal.party], proposal.sender,
         )
-        for i, proposal in sent
+        for i, proposal in _sent(memories)
     ]  # fmt: skip
     return listed(rows, PROPOSAL_COLUMNS)
 
 
-def plans(asked: Sequence[Asked], sent: Sequence[tuple[int, Proposal]], ugvs: Sequence[str], uav: str) -> pd.DataFrame:
-    """`Trace.plans` of the policies that were asked, with the proposals sent."""
-    numbers = {(proposal.issued, ugvs[i]): proposal.number for i, proposal in sent}
+def plans(memories: Mapping[str, PlannerState], ugvs: Sequence[str]) -> pd.DataFrame:
+    """`Trace.plans` of what planners remember."""
+    numbers = {(proposal.issued, ugvs[i]): proposal.number for i, proposal in _sent(memories.values())}
     rows = [
         {
             "t_s": asking.t, "uav": uav, "ugv": asking.robot, "policy": asking.policy, "outcome": _outcome(asking),
             "reason": asking.reason,
             "sent": [numbers[asking.t, ugv] for ugv in asking.party if asking.chosen and (asking.t, ugv) in numbers],
         }
-        for asking in asked
+        for uav, asking in _asked(memories)
     ]  # fmt: skip
     return typed(rows, PLAN_COLUMNS, "sent")
+
+
+def _asked(memories: Mapping[str, PlannerState]) -> list[tuple[str, Asked]]:
+    """The policies that were asked, each with its UAV, by time."""
+    asked = [(uav, asking) for uav, memory in memories.items() for asking in memory.asked]
+    return sorted(asked, key=lambda entry: entry[1].t)
 
 
 def _outcome(asking: Asked) -> str:
@@ -283,30 +294,32 @@ def _outcome(asking: Asked) -> str:
     return "proposed" if asking.chosen else "passed over" if asking.party else "nothing"
 
 
-def messages(memory: PlannerState, trace: Trace, uav: str) -> pd.DataFrame:
-    """`Trace.messages` of a run, from what the UAV remembers, and from the decisions and samples of the trace."""
-    rows = sorted(_messages(memory, trace, uav), key=lambda row: (row["sent_s"], _ORDER.index(row["kind"])))
+def messages(memories: Iterable[PlannerState], trace: Trace) -> pd.DataFrame:
+    """`Trace.messages` of a run, from what the UAVs remember, and from the decisions and samples of the trace."""
+    rows = sorted(_messages([*memories], trace), key=lambda row: (row["sent_s"], _ORDER.index(row["kind"])))
     return typed(rows, MESSAGE_COLUMNS)
 
 
 _ORDER = ("answer", "withdrawal", "proposal")  # kinds of messages of one instant, in the order of the table
 
 
-def _messages(memory: PlannerState, trace: Trace, uav: str) -> Iterator[dict[str, Any]]:
+def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[str, Any]]:
     """Rows of messages; each is delivered when it is sent."""
+    sent = _sent(memories)
+    parties = {proposal.number: (proposal.sender, trace.ugvs[i]) for i, proposal in sent}
 
     def row(kind: str, number: int, about: int, sent_s: float, read_s: float) -> dict[str, Any]:
-        ugv = trace.ugvs[memory.sent[about][0]]
+        uav, ugv = parties[about]
         sender, receiver = (ugv, uav) if kind == "answer" else (uav, ugv)
         return {
             "kind": kind, "number": number, "copy": 0, "sender": sender, "receiver": receiver, "about": about,
             "sent_s": sent_s, "received_s": sent_s, "read_s": read_s,
         }  # fmt: skip
 
-    read, never = dict(memory.read), float("nan")
+    read, never = dict(read for memory in memories for read in memory.read), float("nan")
     latest_first = (trace.decisions[name].tolist()[::-1] for name in ("number", "t_s"))
     decided = dict(zip(*latest_first, strict=True))  # when each was decided on first
-    for i, proposal in memory.sent:
+    for i, proposal in sent:
         number, issued = proposal.number, proposal.issued
         if trace.meta["method"] == "b":  # accepted at once
             executing = trace.sampled(f"{trace.ugvs[i]}.executing") == number
@@ -314,17 +327,18 @@ def _messages(memory: PlannerState, trace: Trace, uav: str) -> Iterator[dict[str
             yield row("proposal", number, number, issued, float(begun[0]) if len(begun) else never)
         else:
             yield row("proposal", number, number, issued, decided.get(number, never))
-    for count, (number, t) in enumerate(memory.withdrawn):
+    withdrawn = sorted((gone for memory in memories for gone in memory.withdrawn), key=lambda gone: gone[1])
+    for count, (number, t) in enumerate(withdrawn):
         yield row("withdrawal", count, number, t, t)
     told = trace.decisions[trace.decisions["answer"] >= 0]
     for t, answer, number in zip(*(told[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
         yield row("answer", answer, number, t, read.get(answer, never))
 
 
-def faults(asked: Sequence[Asked]) -> list[dict[str, Any]]:
+def faults(memories: Mapping[str, PlannerState]) -> list[dict[str, Any]]:
     """Entries of `Trace.meta["faults"]`; the first fault of each policy has a traceback, if it is known."""
     told, entries = set[str](), []
-    for fault in (asking for asking in asked if asking.what):
+    for fault in (asking for _, asking in _asked(memories) if asking.what):
         entry = {"t_s": fault.t, "robot": fault.robot, "policy": fault.policy, "what": fault.what}
         if fault.traceback and fault.policy not in told:
             entry["traceback"] = fault.traceback

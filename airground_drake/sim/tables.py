@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-SCHEMA = "airground_drake.trace/9"
+SCHEMA = "airground_drake.trace/10"
 
 DECISION_COLUMNS = {
     "t_s": "float64",
@@ -75,16 +75,18 @@ does not give is empty. The normals are those of the half-planes of `route_bound
 
 PROPOSAL_COLUMNS = (
     "number", "robot", "policy", "issued_s", "times_s", "positions_m", "selection", "mapped", "cause", "party",
+    "sender",
 )  # fmt: skip
 """Columns of `Trace.proposals`, one row per proposal sent; arrays are flattened in C order:
-- number: identifies the proposal; counts from 0 in the order of sending.
+- number: identifies the proposal, whichever UAV sent it; increases in the order of sending of each UAV, from 0.
 - robot, policy, issued_s: its UGV, its policy, the time of sending.
 - times_s (M), positions_m (M x 3): vertices of the requested motion.
 - selection (m x 3): J_int of (12)-(14), the directions that the motion concerns.
 - mapped: outlines of the obstacles on the UAV's map, without padding, one after the other: see
   `model.geometry.outline`.
 - cause: the UGV whose trigger led to it: this UGV, or another UGV for which it makes way.
-- party: indices in `ugvs` of all UGVs in the same joint plan; empty if the proposal stands alone."""
+- party: indices in `ugvs` of all UGVs in the same joint plan; empty if the proposal stands alone.
+- sender: the UAV."""
 
 
 MESSAGE_COLUMNS = {

@@ -77,10 +77,25 @@ class PlannerState:
         return tuple(talk.proposal for talk in self.talks)
 
 
-def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerState:
+class Sender(NamedTuple):
+    """A UAV, and the numbers that it gives its proposals: no other UAV gives the same."""
+
+    uav: str = "uav"  # name of the UAV
+    first: int = 0  # its first number
+    step: int = 1  # from one of its numbers to the next
+
+    def number(self, count: int) -> int:
+        """The number of a proposal after so many others of this UAV."""
+        return self.first + self.step * count
+
+
+ONLY = Sender()
+
+
+def sent_after(before: PlannerState, after: PlannerState, t: float, sender: Sender) -> PlannerState:
     """Number the new proposals of a planning instant, and note what was sent and withdrawn; `t` in s."""
-    # Every new proposal gets the next number and the time t, even if the planner has set others. So no planner can send
-    # another motion under a number that a UGV has already answered.
+    # Every new proposal gets the sender, its next number and the time t, even if the planner has set others. So no
+    # planner can send another motion under a number that a UGV has already answered.
     sent, talks, withdrawn = list(before.sent), list(after.talks), list(before.withdrawn)
     for i, (old, talk) in enumerate(zip(before.talks, after.talks, strict=True)):
         if talk.proposal is old.proposal:
@@ -88,7 +103,7 @@ def sent_after(before: PlannerState, after: PlannerState, t: float) -> PlannerSt
         if old.proposal is not None:
             withdrawn.append((old.proposal.number, t))
         if talk.proposal is not None:
-            proposal = replace(talk.proposal, number=len(sent), issued=t)
+            proposal = replace(talk.proposal, number=sender.number(len(sent)), issued=t, sender=sender.uav)
             talks[i] = replace(talk, proposal=proposal)
             sent.append((i, proposal))
     return replace(after, talks=tuple(talks), sent=tuple(sent), withdrawn=tuple(withdrawn))
@@ -118,6 +133,7 @@ class Planner:
     coasting: float = 3.0  # time for which an obstacle that moves is predicted to keep its velocity; then it stands, s
     # Per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.
     trails: tuple[bool, ...] = ()
+    sender: Sender = ONLY  # the UAV
 
     @property
     def radii(self) -> Array:
@@ -164,7 +180,7 @@ class Planner:
         standing: Sequence[bool] = (),
         sightings: Sequence[Sighting] = (),
     ) -> PlannerState:
-        """The memory after one planning period; `t` in s; `positions` (n + 1, 3), m; `answers` (2n,)."""
+        """The memory after one planning period; `t` in s; `positions` of r robots (r, 3), m; `answers` (2n,)."""
         # standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]

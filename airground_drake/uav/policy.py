@@ -144,6 +144,7 @@ class Proposal:
             way for it. Empty: this UGV.
         party: names of all UGVs in the same joint plan; empty: the proposal stands alone.
         number: identifies the proposal in the UGV's answer. `planner.sent_after` gives it; before that it is -1.
+        sender: name of the UAV that sends it, as `planner.sent_after` gives it.
     """
 
     policy: str
@@ -154,6 +155,7 @@ class Proposal:
     cause: str = ""
     party: tuple[str, ...] = ()
     number: int = -1
+    sender: str = ""
 
     @property
     def joint(self) -> tuple[float, tuple[str, ...]]:

@@ -17,6 +17,7 @@ from airground_drake.scenario.schema import Control, Scenario, Uav, Ugv
 
 # By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none.
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
+KINDS = {"air_ground": "uav_ugv", "ugv": "ugv_ugv"}  # by `Scenario.pair_of`, of two robots
 MOVING = "moving"  # the kind of a robot beside an obstacle that may move: no theorem keeps its distance
 # The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points.
 STEERED = "steered"
@@ -32,7 +33,7 @@ def kind_of(scenario: Scenario, first: str, second: str) -> str:
         return STEERED
     if len(robots) < 2:
         return "obstacle"
-    return "uav_ugv" if scenario.uav.name in (first, second) else "ugv_ugv"
+    return KINDS[scenario.pair_of(first, second)]
 
 
 class Apart(NamedTuple):
@@ -48,15 +49,15 @@ class Apart(NamedTuple):
 def apart(scenario: Scenario) -> Iterator[Apart]:
     """Who must keep apart: robot by robot each barrier, and then each two robots."""
     safe = scenario.safe_distance
-    uav = scenario.uav.name
     robots = scenario.robots
     for (name, robot), (other, barrier) in product(robots.items(), scenario.barriers.items()):
         moves = barrier.expected_speed_m_s > 0.0
         required = barrier.distance_m or (moves and safe.moving_m) or safe.obstacle_m
         yield Apart(name, other, MOVING if moves else "obstacle", required, (robot.radius_m, barrier.radius_m))
     for name, other in combinations(robots, 2):
-        kind, required = ("uav_ugv", safe.air_ground_m) if uav in (name, other) else ("ugv_ugv", safe.ugv_m)
-        yield Apart(name, other, kind, required, (robots[name].radius_m, robots[other].radius_m))
+        pair = scenario.pair_of(name, other)
+        radii = robots[name].radius_m, robots[other].radius_m
+        yield Apart(name, other, KINDS[pair], getattr(safe, f"{pair}_m"), radii)
 
 
 class PairKind(NamedTuple):

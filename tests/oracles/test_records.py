@@ -223,6 +223,7 @@ def test_an_edited_record_is_noticed(base: Base, oracle: str, row: Any) -> None:
         proposals(lambda table: table.iloc[:0]),
         proposals(lambda table: table.assign(robot="ugv9")),
         proposals(lambda table: table.assign(cause="ugv9")),
+        proposals(lambda table: table.assign(sender="uav9")),
         each_value(positions_m=lambda v: v[:-1]),
         each_value(times_s=lambda v: v[::-1]),
         each_value(positions_m=lambda v: np.nan * v),

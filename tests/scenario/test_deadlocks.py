@@ -66,7 +66,7 @@ def test_everybody_can_arrive_with_room_to_spare(name: str) -> None:
 def test_the_map_of_the_warehouse_is_wrong() -> None:
     scenario = load("warehouse")
     real = {as_tuple(row) for each in scenario.barriers.values() for row in outlines_of(scenario, each)}
-    on_map = set(map(as_tuple, make_map(scenario)[0]))
+    on_map = set(map(as_tuple, make_map(scenario, scenario.uav)[0]))
     assert (len(real - on_map), len(on_map - real)) == (1, 1)
 
 

@@ -129,3 +129,18 @@ def test_what_a_message_allows_is_allowed_and_no_more(write: Write) -> None:
     assert "at least 2.33 m for two and one" in message(short)
     fast = edit(edit(SMALL_DATA, "control.period_s", 0.03), "control.motion_gain_1_s", 33.33333334)
     assert "at most 33.3333333 1/s" in message(write(yaml.safe_dump(fast)))
+
+
+def test_a_scenario_says_what_each_body_and_each_pair_is() -> None:
+    scenario = validated(case_a(), {"uav.name": "kite", "reproduction": [], "arena_m": [[-20, -20], [20, 20]]})
+    keys = {
+        "ugv1": "ugvs.ugv1",
+        "kite": "uav",
+        "obstacle_1": "obstacles.obstacle_1",
+        "arena_east": "obstacles.arena_east",
+    }
+    assert {name: scenario.key_of(name) for name in keys} == keys
+    assert [scenario.kind_of(name) for name in keys] == ["ugv", "uav", "obstacle", "obstacle"]
+    assert (scenario.pair_of("ugv1", "ugv2"), scenario.pair_of("kite", "ugv1")) == ("ugv", "air_ground")
+    with pytest.raises(KeyError, match="nobody"):
+        scenario.kind_of("nobody")

@@ -19,7 +19,7 @@ from airground_drake.model.geometry.outline import as_tuple, balls, stacked
 from airground_drake.sim.components import make_planner
 from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, SILENT, Report, accepted_proposals, answer_to
-from airground_drake.uav.planner import Planner, PlannerState, sent_after
+from airground_drake.uav.planner import Planner, PlannerState, Sender, sent_after
 from airground_drake.uav.policy import Observation, Policy
 
 PLACES = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, 3.0]])
@@ -65,7 +65,7 @@ def step(
         number = talk.proposal.number if talk.proposal else -1
         given += [(answers or {}).get(name, SILENT), number]
     called = [name in intervening.split() for name in UGVS]
-    return sent_after(memory, uav.plan(memory, t, PLACES, called, np.array(given), reports), t)
+    return sent_after(memory, uav.plan(memory, t, PLACES, called, np.array(given), reports), t, uav.sender)
 
 
 def in_force(memory: PlannerState) -> dict[str, tuple[float, str]]:
@@ -192,6 +192,17 @@ def test_proposals_are_numbered_as_they_are_sent() -> None:
         ("one", 0, 1.0), ("three", 1, 1.0), ("one", 2, 2.0), ("two", 3, 2.0),
     ]  # fmt: skip
     assert [sent.number for sent in memory.proposals if sent] == [2, 3, 1]
+
+
+def test_numbers_are_unique_over_uavs_and_say_who_sent_them() -> None:
+    numbers = []
+    for k, name in enumerate(("north", "south", "west")):
+        uav = planner(Scripted({"one": wait(2.0), "three": wait(9.0)}, {"one": wait(9.0)}))
+        uav = replace(uav, sender=Sender(name, first=k, step=3))
+        memory = step(uav, step(uav, uav.start(), 1.0, "one"), 2.0, "one")
+        assert {sent.sender for _, sent in memory.sent} == {name}
+        numbers += [sent.number for _, sent in memory.sent]
+    assert sorted(numbers) == [*range(9)]
 
 
 def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -321,7 +332,7 @@ def test_a_policy_sees_each_robot_as_it_is() -> None:
 
 def test_the_planner_has_each_ugv_s_own_limits() -> None:
     scenario = load("case_a", ["ugvs.ugv1.max_speed_m_s=2.5", "ugvs.ugv2.radius_m=0.1", "safe_distance.ugv_m=1.0"])
-    made = make_planner(scenario, METHODS["d"])
+    made = make_planner(scenario, METHODS["d"], "uav")
     assert made.max_speed.tolist() == [2.5, scenario.ugvs["ugv2"].max_speed_m_s] != [2.5, 2.5]
     assert made.radii.tolist() == [0.0, 0.1]
 
@@ -338,4 +349,4 @@ def test_the_planner_has_each_ugv_s_own_limits() -> None:
 )
 def test_who_may_fall_behind_a_motion(plant: str, behind: bool) -> None:
     scenario = load("minimal", [f"ugvs.ugv1.plant={plant}", "ugvs.ugv1.max_speed_m_s=3.0"])
-    assert make_planner(scenario, METHODS["d"]).trails == (behind,)
+    assert make_planner(scenario, METHODS["d"], "uav").trails == (behind,)

@@ -75,7 +75,8 @@ def between_obstacles(scenario: Scenario) -> tuple[list[Array], Array]:
 
 def _uav_target(scenario: Scenario) -> Item:
     """Item 21: the UAV's target is not over the centroid of the UGVs' targets."""
-    target = scenario.uav.target_m[:2]
+    (uav,) = scenario.aerial.values()
+    target = uav.target_m[:2]
     centroid = np.mean([ugv.target_m[:2] for ugv in scenario.ugvs.values()], axis=0).tolist()
     away = dist(target, centroid)
     return item(

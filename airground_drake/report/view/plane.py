@@ -105,7 +105,7 @@ def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tup
         _disc(axes, ball.place_m, ball.radius_m[0], INK)
         axes.plot(*ball.place_m[:2], **hexagon, markerfacecolor=INK if ball.known_to_uav else "white")
     labels = [_name_of(barrier) for barrier in barriers] if len(barriers) <= MAX_NAMED_BARRIERS else []
-    for at in scenario.uav.phantoms_m:
+    for at in (at for uav in scenario.aerial.values() for at in uav.phantoms_m):
         axes.plot(*at[:2], marker="x", markersize=6, color=MUTED, zorder=3)
         labels.append(Label(np.array(at), "(only on the UAV's map)", size_pt=7.5))
     edges = [part for wall in walls for part in wall.body]
@@ -202,8 +202,8 @@ def _wedges(axes: Axes, way: Array, headings: Array, radius_m: float, color: str
 
 
 def looks_of(scenario: Scenario, ugvs: Iterable[str]) -> dict[str, Look]:
-    """The look of each of some UGVs, in turn, and of the UAV."""
-    return {**{ugv: look(k) for k, ugv in enumerate(ugvs)}, scenario.uav.name: UAV_LOOK}
+    """The look of each of some UGVs, in turn, and of the UAVs."""
+    return {ugv: look(k) for k, ugv in enumerate(ugvs)} | dict.fromkeys(scenario.aerial, UAV_LOOK)
 
 
 def plot(trace: Trace, axes: Axes | None = None) -> Axes:

@@ -156,14 +156,14 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
     robots = tuple(
         Robot(
             name=name,
-            kind="UGV" if name in scenario.ugvs else "UAV",
+            kind="UGV" if scenario.kind_of(name) == "ugv" else "UAV",
             radius_m=max(mark, spec.radius_m),
             target_m=np.array(spec.target_m),
             turns=HEADING in plant_of(spec, scenario.control.period_s).signals,
         )
         for name, spec in specs.items()
     )
-    phantoms = np.reshape(scenario.uav.phantoms_m, (-1, 3))
+    phantoms = np.reshape([at for uav in scenario.aerial.values() for at in uav.phantoms_m], (-1, 3))
     return Stage(robots, barriers_of(scenario, mark), arena_of(scenario), phantoms, low, high, mark)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Sequence
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -38,6 +39,7 @@ from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, accepted_proposals, sightings
 from airground_drake.uav.planner import PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.answer import GatekeeperDecision
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 
 
@@ -48,13 +50,15 @@ class LeftToDrakeError(Exception):
 class Batch:
     """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
-    # Left to Drake: users' plants and controllers, lags and delays, errors of measured positions, and tasks of the UAV
-    # that are not the package's; monitors, observers, decision blocks and disturbances are no part of a scenario.
+    # Left to Drake: plants and controllers of the user, lags and delays, several UAVs, errors of positions, and tasks
+    # of the UAV that are not the package's; monitors, observers, decision blocks and disturbances are no part of a
+    # scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Set it up: everything that does not depend on the seed."""
         self.scenario, self.name = scenario, name
         run, given = scenario.runs[name], own(scenario, name)
+        self.given = given
         method, control = method_of(run.method), given.control
         self.world = world = make_world(given)
         n, r = len(world.names("ugv")), len(world.robots)
@@ -63,13 +67,16 @@ class Batch:
                 raise LeftToDrakeError(f"the plant of {body.name}")
         if given.sensing is not None:
             raise LeftToDrakeError("errors of measured positions")
+        (flown_by, uav), *more = given.aerial.items()
+        if more:
+            raise LeftToDrakeError("several UAVs")
         if given.ugv_controller is not None:
             raise LeftToDrakeError(f"the controller {given.ugv_controller.kind} of the UGVs")
-        if UAV_TASKS.load(given.uav.task, of=Task) is not FormationTask:
-            raise LeftToDrakeError(f"the task {given.uav.task} of the UAV")
+        if UAV_TASKS.load(uav.task, of=Task) is not FormationTask:
+            raise LeftToDrakeError(f"the task {uav.task} of the UAV")
         presets = components.make_presets(given)
         self.law = components.make_law(given, method, run.composition)  # type: ignore[arg-type]
-        self.planner = components.make_planner(given, method)
+        self.planner = components.make_planner(given, method, flown_by)
         self.gatekeepers: Gatekeepers | None = components.make_gatekeepers(given, self.law) if method.gated else None
         self._avoidance = components.make_avoidance(given)
         self.near = Around(world.around(world.select("ugv")), world.around(world.select("uav")))
@@ -78,14 +85,14 @@ class Batch:
         breaks, places = components.stack_presets(presets)
         scripts = [vertices_of(body) for body in world.moving[r:]]
         gated, steering = self.gatekeepers is not None, world.steering
-        periods = {loop.PLAN: self.planner.period, **({loop.GATE: given.gatekeeper.period_s} if gated else {})}
+        periods = ((loop.PLAN, self.planner.period), *([(loop.GATE, given.gatekeeper.period_s)] if gated else []))
         ticks, due = _schedule(scenario.duration_s, control.period_s, noise.noise_period_s, periods)
         shortest = min(control.period_s, noise.noise_period_s)
         self.draws = int(scenario.duration_s / noise.noise_period_s) + 2
         self.team = Team(
             law=self.law.numbers,
             layer=self._avoidance.layer,
-            uav=np.array([given.uav.altitude_m, control.formation_gain_1_s], dtype=np.float64),
+            uav=np.array([uav.altitude_m, control.formation_gain_1_s], dtype=np.float64),
             steering=np.zeros((n, NUMBERS)) if steering is None else steering,
             turns=steering is not None,
             levels=trigger.levels,
@@ -111,9 +118,14 @@ class Batch:
             body.plant.heading_rad if isinstance(body.plant, Unicycle) else 0.0 for body in world.bodies[:n]
         ])  # fmt: skip
         self.rows = int(1.3 * len(ticks)) + 400
-        sampling_s = [control.period_s, 0.0]
-        self.meta: dict[str, Any] = {
-            "zeta_m": float(zeta),
+        self.zeta = float(zeta)
+
+    @cached_property
+    def meta(self) -> dict[str, Any]:
+        """What only the simulation knows, for its traces."""
+        r, sampling_s = len(self.world.robots), [self.given.control.period_s, 0.0]
+        return {
+            "zeta_m": self.zeta,
             "controllers": {
                 "ugv_controller": of_ugvs(self.near.ugvs, self.law, r, sampling_s),
                 "uav_controller": read_back(self.near.uav, self._avoidance, r, sampling_s),
@@ -133,13 +145,18 @@ class Batch:
             SimulationError: if planner or gatekeeper stop the run; names it and the time.
             LeftToDrakeError: if the run ends in another error.
         """
+        return self.made(seed).trace()
+
+    def made(self, seed: int | None = None) -> Going:
+        """The run with a seed at its end; raises as `simulate`."""
         started = time.perf_counter()
         try:
             run = self.begin(seed)
             run.advance(self.scenario.duration_s)
         finally:
             self.database.close()
-        return run.trace(time.perf_counter() - started)
+        run.wall_s = time.perf_counter() - started
+        return run
 
     def begin(self, seed: int | None = None) -> Going:
         """A run at its initial state."""
@@ -192,6 +209,7 @@ class Going:
         self._executed: list[Proposal | None] = [None] * n
         self._accepted = _accepted(self._executed)
         self._ahead: PlannerState | None = None
+        self.wall_s = 0.0  # its duration by the clock, if it was made at one go
         self.advance(0.0)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -206,7 +224,7 @@ class Going:
         return float(self._state.time[0])
 
     def positions(self) -> Array:
-        """Positions of all robots, UAV last, (n + 1, 3), m."""
+        """Positions of all r robots, (r, 3), m."""
         return self._state.place[: len(self._batch.world.robots)].copy()
 
     def advance(self, until: float) -> None:
@@ -227,16 +245,30 @@ class Going:
             elif code == loop.PYTHON:
                 self._update()
             else:
-                raise LeftToDrakeError("the run ends in an error")
+                raise LeftToDrakeError("a run that ends in an error")
 
     def plan_ahead(self) -> None:
         """Plan for this instant, before its updates, which then take this result; the last one counts."""
         self._ahead = self._planned()
 
-    def trace(self, wall_s: float = 0.0) -> Trace:
-        """The trace of the run until now; `wall_s`: its duration by the clock."""
-        batch, rows = self._batch, int(self._state.counts[1])
-        log = Log(*(column[:rows] for column in self._log))
+    @property
+    def log(self) -> Log:
+        """The rows until now."""
+        return Log(*(column[: self._state.counts[1]] for column in self._log))
+
+    @property
+    def memory(self) -> PlannerState:
+        """What the planner remembers."""
+        return self._memory
+
+    @property
+    def decided(self) -> Sequence[GatekeeperDecision]:
+        """The decisions of the gatekeepers."""
+        return self._answering.made
+
+    def trace(self) -> Trace:
+        """The trace of the run until now."""
+        batch, log = self._batch, self.log
         logged = {
             "bodies": log.bodies, "team_command": log.command, "reference": log.reference, "noise": log.noise,
             "decision_variable": log.x, "status": log.status, "executing": log.executing,
@@ -246,11 +278,11 @@ class Going:
         done = Done(
             t=log.t,
             logged={name: rows.T for name, rows in logged.items()},
-            memory=self._memory,
-            decided=self._answering.made,
+            memories={batch.planner.sender.uav: self.memory},
+            decided=self.decided,
             seed=self._seed,
             until_s=self.t,
-            wall_s=wall_s,
+            wall_s=self.wall_s,
             meta=batch.meta,
         )
         return trace_of(batch.scenario, batch.name, batch.world, done, batch.world.signals)
@@ -290,7 +322,7 @@ class Going:
             memory, t, places[: len(batch.world.robots)], intervening, np.array(self._answers()),
             self._answering.reports, stands, sightings(batch.world, t, places),
         )  # fmt: skip
-        return sent_after(memory, planned, t)
+        return sent_after(memory, planned, t, batch.planner.sender)
 
     def _judged(self) -> GatekeeperState:
         """What the gatekeepers remember after a sample."""
@@ -315,21 +347,22 @@ class Going:
         ]
 
 
+@lru_cache(maxsize=8)
 def _schedule(
-    duration_s: float, control_s: float, noise_s: float, periods: dict[int, float]
+    duration_s: float, control_s: float, noise_s: float, periods: tuple[tuple[int, float], ...]
 ) -> tuple[Array, loop.Ints]:
     """Times of all timed events, s, and what is due then: with Drake's own arithmetic, k times the period."""
     found: dict[float, int] = {}
     for bit, period in ((loop.CONTROL, control_s), (loop.NOISE, noise_s)):
         for k in range(int(duration_s / period) + 2):
             found[k * period] = found.get(k * period, 0) | bit
-    for bit, period in periods.items():
+    for bit, period in periods:
         ticks = Ticks(period, control_s)
         for k in range(int(duration_s / ticks.period) + 2):
             t = k * ticks.period
             found[t] = found.get(t, 0) | (bit if ticks.due(t) else 0)
     times = sorted(found)
-    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)
+    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)  # nothing writes to them
 
 
 def _holds(breaks: Array, places: Array) -> Array:

@@ -189,15 +189,17 @@ class UavController(_Controller):
         *,
         gain: float,
         altitude: float,
+        uav: str = "",
         task: Callable[[Array, Array, float, float], Task] = FormationTask,
     ) -> None:
         """Declare ports, state and the periodic update.
 
         Args:
-            world: with one UAV.
+            world: the bodies.
             avoidance: the set-based layer.
             gain: of the task, 1/s, by default.
             altitude: m.
+            uav: name of the UAV; default: the first of the world.
             task: makes the task of a sample from positions (n, 3), m, and velocities (n, 3), m/s, of the UGVs,
                 altitude and gain; it gives the velocity of one robot, (1, 3), m/s.
         """
@@ -206,7 +208,8 @@ class UavController(_Controller):
         self._task = task
         self._gain = gain
         self._altitude = altitude
-        self._world, self._ugvs, self._own = world, world.select("ugv"), world.select("uav")
+        row = world.robots.index(uav) if uav else world.select("uav").start
+        self._world, self._ugvs, self._own = world, world.select("ugv"), slice(row, row + 1)
         self._near = world.around(self._own)
         self._bodies = declare_bodies(self, world)
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))

@@ -122,4 +122,4 @@ class InterventionPlanner(LeafSystem):
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         moving = sightings(self._world, t, bodies)
         memory = self._planner.plan(before, t, bodies[self._robots], intervening, answers, reports, stands, moving)
-        return sent_after(before, memory, t)
+        return sent_after(before, memory, t, self._planner.sender)

@@ -149,8 +149,9 @@ class Spec(File):
             base = self._fixed_part
             distance = base.safe_distance
             rng = stream(self.seed, COURSE, index)
+            altitude_m = max(uav.altitude_m for uav in base.aerial.values())
             try:
-                overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m, base.uav.altitude_m)
+                overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m, altitude_m)
             except ValueError as error:
                 raise ScenarioError(self.source, COURSE, Fault(str(error)), "wanted: a larger field") from None
         scenario = self._with(overrides | dict(values))

@@ -60,7 +60,7 @@ class ByDrake:
         return float(self._simulator.get_context().get_time())
 
     def positions(self) -> Array:
-        """Positions of all robots, UAV last, (n + 1, 3), m."""
+        """Positions of all r robots, UAVs last, (r, 3), m."""
         model = self._recorder.model
         port = model.diagram.GetOutputPort("bodies")
         bodies: Array = port.Eval(model.diagram.GetMyContextFromRoot(self._simulator.get_context()))
@@ -68,8 +68,8 @@ class ByDrake:
 
     def plan_ahead(self) -> None:
         """Plan for this instant, before its updates, which then take this result; the last one counts."""
-        planner = self._recorder.model.planner
-        planner.plan_ahead(planner.GetMyContextFromRoot(self._simulator.get_context()))
+        for planner in self._recorder.model.planners.values():
+            planner.plan_ahead(planner.GetMyContextFromRoot(self._simulator.get_context()))
 
     def advance(self, until: float) -> None:
         """Go on to a time, s; the updates of that instant are still to be made."""
@@ -100,7 +100,8 @@ class Stage:
             self._begin, self.database = batch.begin, batch.database
         except LeftToDrakeError:
             recorder = Recorder(scenario, run)
-            self._begin, self.database = partial(ByDrake, recorder), recorder.model.planner.database
+            (planner,) = recorder.model.planners.values()
+            self._begin, self.database = partial(ByDrake, recorder), planner.database
         self.agent: Agent = next(policy for _, policy in self.database.policies if isinstance(policy, Agent))
         self.targets = np.array([robot.target_m for robot in scenario.robots.values()])
         self.ugvs = tuple(scenario.ugvs)
@@ -155,11 +156,11 @@ class Episode:
         return self._run.t
 
     def positions(self) -> Array:
-        """Positions of all robots, UAV last, (n + 1, 3), m."""
+        """Positions of all r robots, UAVs last, (r, 3), m."""
         return self._run.positions()
 
     def distances_left(self) -> Array:
-        """Distances of all robots from their targets, UAV last, (n + 1,), m."""
+        """Distances of all r robots from their targets, UAVs last, (r,), m."""
         return np.asarray(np.linalg.norm(self.positions() - self.stage.targets, axis=1))
 
     def requests(self) -> dict[str, Observation]:
@@ -213,7 +214,7 @@ class Episode:
             raise SimulationError(self.stage.run, self.t, str(error)) from error
         self._chosen, self._requests = {}, {}
         away = self.distances_left() > self.stage.scenario.arrival_tolerance_m
-        for ugv, far in zip(self.stage.ugvs, away[:-1], strict=True):
+        for ugv, far in zip(self.stage.ugvs, away[: len(self.stage.ugvs)], strict=True):
             self.away_s[ugv] += (until - before) * float(far)
         self._settled_s = 0.0 if away.any() else self._settled_s + until - before
         self.ended = until >= self._end or self._settled_s >= SETTLED_S

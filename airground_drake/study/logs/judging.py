@@ -205,7 +205,6 @@ def _both(
 
 def _pairs(scenario: Json, bodies: Mapping[str, Track]) -> list[Pair]:
     """The pairs of bodies that are in the log; further UAVs are as the scenario's own one."""
-    uav = scenario["uav"]["name"]
     pairs = pairs_of(scenario)
     for name in bodies:
         if name not in robots_of(scenario) and name not in scenario["obstacles"]:
@@ -213,7 +212,7 @@ def _pairs(scenario: Json, bodies: Mapping[str, Track]) -> list[Pair]:
             alike["uav"]["name"] = name
             pairs += [pair for pair in pairs_of(alike) if name in (pair.robot, pair.other)]
     movers = (name for name, obstacle in scenario["obstacles"].items() if obstacle["moves"])
-    must_be = {*robots_of(scenario), uav, *bodies, *movers}
+    must_be = {*robots_of(scenario), *bodies, *movers}
     return [pair for pair in pairs if all(name in bodies or name not in must_be for name in (pair.robot, pair.other))]
 
 

@@ -67,7 +67,7 @@ def page(
 
 def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
     """The ways of all bodies; nothing is drawn where one was not recorded."""
-    known = {name: name if name in scenario.robots else scenario.uav.name for name in tracks.bodies}
+    known = {name: name if name in scenario.robots else next(iter(scenario.aerial)) for name in tracks.bodies}
     robots = [name for name in tracks.bodies if name not in scenario.obstacles]
     frame = frame_of(scenario, [(known[name], tracks.bodies[name].places_m) for name in robots])
     figure, axes = axes_over(frame, frame.width_in(_MAP_IN, canvas.TALLEST_IN))
@@ -171,7 +171,7 @@ def scene(judged: Judged, tracks: Tracks, scenario: Scenario, logs: Sequence[str
     for name, track in tracks.bodies.items():
         if name in scenario.obstacles:
             continue
-        radius_m = known[scenario.uav.name].radius_m
+        radius_m = known[next(iter(scenario.aerial))].radius_m
         robot = known.get(name) or Robot(name, "UAV", radius_m, track.places_m[-1], turns=False)
         unturned = {**vars(robot), "turns": False, "headings": np.zeros(len(times))}  # a log need not have headings
         bodies.append(DrawnBody(**unturned, positions=positions(track), states=np.zeros(len(times), dtype=np.intp)))

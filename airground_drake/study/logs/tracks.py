@@ -14,7 +14,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import LogError, one_line
 from airground_drake.check.files import Json
 from airground_drake.check.limits import LARGEST
-from airground_drake.check.scenario import expected_m_s, robots_of
+from airground_drake.check.scenario import expected_m_s, robots_of, uavs_of
 from airground_drake.study.logs import axes, names, units
 from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, RECEIPT, Log, Stream, Whole
 
@@ -149,9 +149,9 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
             stream.skipped["no height"] += int(flat.sum())
             stream.places, ns = stream.places[~flat], ns[~flat]
         tracks[name] = _track(name, stream, ns, choice.gap_s, _fastest(name, scenario), _start(name, scenario), said)
-    uav = scenario["uav"]["name"]
-    if uav not in streams and uav not in choice.without:
-        said.append(f"{uav} is not in the log: its distances are not judged")
+    for uav in uavs_of(scenario):
+        if uav not in streams and uav not in choice.without:
+            said.append(f"{uav} is not in the log: its distances are not judged")
     if choice.uavs:
         said.append("distances between UAVs are not judged: the scenario promises none")
     for name in tracks:

@@ -386,14 +386,14 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     """How many avoidance inequalities were in range of a robot, and how many bound a command, by who avoided whom."""
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
-    beside = ["obstacle" for _ in parts_of(trace).owner] + ["ugv" for _ in trace.ugvs] + ["uav"]
+    kind_of = trace.scenario.kind_of
+    beside = ["obstacle" for _ in parts_of(trace).owner] + [kind_of(robot) for robot in trace.robots]
     in_range = 0
     for robot in trace.robots:
         given = inequalities_of(trace, robot, as_seen=trace.scenario.sensing is not None)
         in_range += len(given.bound)
-        kind = "ugv" if robot in trace.ugvs else "uav"
         for column in given.column[given.slack(trace.chosen(robot)) <= BINDING_M_S].tolist():
-            count[f"{kind} beside {beside[column]}"] += 1
+            count[f"{kind_of(robot)} beside {beside[column]}"] += 1
     return in_range, count
 
 

@@ -211,7 +211,7 @@ def demands(scenario: Scenario) -> list[Demand]:
     demanded = []
     for pair in apart(scenario):
         is_point = pair.second in balls or pair.second in scenario.robots
-        core = "" if is_point else "solid" if pair.first == scenario.uav.name else "ground"
+        core = "" if is_point else "solid" if scenario.kind_of(pair.first) == "uav" else "ground"
         radii = sum(map(decimal, pair.radii_m), Fraction(0))
         demanded.append(Demand(pair.first, pair.second, decimal(pair.required_m), radii, core, pair.kind == MOVING))
     return demanded

@@ -60,7 +60,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     safe, share = safe[:, column], share[:, column]
     bodies = np.unique(parts.owner[moving], return_inverse=True)[1]
     carrier = np.concatenate([everybody, len(robots) + bodies])
-    with_uav = np.array([name == scenario.uav.name for name in robots])
+    with_uav = np.array([scenario.kind_of(name) == "uav" for name in robots])
     wanted = {}
     for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
         beside = np.array([np.delete(np.arange(len(column)), m + i) for i in team])

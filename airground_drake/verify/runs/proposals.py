@@ -28,6 +28,7 @@ class ProposalRecord:
     mapped: Array  # outlines of the obstacles on the UAV's map, (k, W), see `model.geometry.outline`
     cause: str  # UGV whose trigger it was sent for: `ugv`, or another UGV that `ugv` is to make way for
     party: tuple[str, ...]  # UGVs with a part in the same joint plan; empty: it stands alone
+    sender: str  # the UAV
 
 
 def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
@@ -48,13 +49,15 @@ def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
         outlines = unpacked(mapped.tolist())
     except ValueError as error:
         raise TraceError(f"{label}: obstacles on its map: {error}") from None
+    if row["sender"] not in trace.uavs:
+        raise TraceError(f"{label}: its sender {row['sender']!r} is no UAV of the trace")
     party = tuple(ugv for i, ugv in enumerate(trace.ugvs) if i in row["party"])
     if len(party) != len(row["party"]) or (party and row["robot"] not in party):
         raise TraceError(f"{label}: not in the joint plan of the UGVs {list(row['party'])}")
     return ProposalRecord(
         number=int(row["number"]), ugv=str(row["robot"]), policy=str(row["policy"]), issued_s=float(row["issued_s"]),
         times_s=times, positions_m=places.reshape(-1, 3), selection=selection.reshape(-1, 3), mapped=outlines,
-        cause=str(row["cause"]), party=party,
+        cause=str(row["cause"]), party=party, sender=str(row["sender"]),
     )  # fmt: skip
 
 

@@ -121,11 +121,11 @@ def test_what_is_planned_ahead_in_one_context_is_not_sent_in_another() -> None:
     contexts.append(begun(model.diagram, scenario.seed))
     contexts[1].SetTime(14.5)
     model.trigger.mutable_levels(model.trigger.GetMyMutableContextFromRoot(contexts[1])).zeta_m = 1e3
-    model.planner.plan_ahead(model.planner.GetMyContextFromRoot(contexts[0]))
+    model.planners["uav"].plan_ahead(model.planners["uav"].GetMyContextFromRoot(contexts[0]))
     sent = []
     for context in contexts[::-1]:
         after = advanced(model.diagram, context, 14.55).get_context()
-        sent.append(len(model.planner.memory(model.planner.GetMyContextFromRoot(after)).sent))
+        sent.append(len(model.planners["uav"].memory(model.planners["uav"].GetMyContextFromRoot(after)).sent))
     assert sent == [0, 1]
 
 

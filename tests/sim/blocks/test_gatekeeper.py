@@ -220,7 +220,7 @@ def test_messages_of_another_kind_are_refused_before_the_run(port: str, sent: ob
     """pydrake connects these ports: to Drake, all Python objects have one type."""
     builder = DiagramBuilder()
     scenario = load("minimal")
-    planner = InterventionPlanner(components.make_planner(scenario, METHODS["d"]), make_world(scenario), 0.05)
+    planner = InterventionPlanner(components.make_planner(scenario, METHODS["d"], "uav"), make_world(scenario), 0.05)
     system = builder.AddNamedSystem("mine", planner if port == "reports" else DirectAcceptance(1))
     source = builder.AddSystem(Announcing(sent))
     builder.Connect(source.get_output_port(), system.GetInputPort(port))
