@@ -500,9 +500,6 @@ def _measured(scenario: Scenario) -> Problems:
         if share < pair.least_gain:
             both = " (each may have to stand for the other)" if pair.second in scenario.robots else ""
             why = f"{pair.promised_m:.9g} m between {pair.first} and {pair.second} with errors of {error_m:.9g} m{both}"
-            if pair.least_gain > 1.0:
-                allowed = f"errors that a gain of 1 / control.period_s bears: {why} need {pair.least_gain:.4f} of it"
-                yield key, error_m, allowed
             needed = _shown(Fraction(pair.least_gain) / decimal(control.period_s), ROUND_CEILING)
             yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"at least {needed} 1/s for {why}"
 
