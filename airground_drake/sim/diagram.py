@@ -27,6 +27,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import (
+    AllProposals,
     DecisionVariable,
     DirectAcceptance,
     EventTrigger,
@@ -135,7 +136,12 @@ def build_model(
     signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))
     vehicles = _vehicles(world, made, disturbed=disturbed)
     planners = {
-        uav: InterventionPlanner(components.make_planner(scenario, chosen, uav), world, scenario.control.period_s)
+        uav: InterventionPlanner(
+            components.make_planner(scenario, chosen, uav),
+            world,
+            scenario.control.period_s,
+            alone=len(scenario.aerial) == 1,
+        )
         for uav in scenario.aerial
     }
     gatekeeper = None
@@ -218,17 +224,27 @@ def _task_planning(
     systems |= {name: planners[uav] for uav, name in _named("intervention_planner", planners).items()}
     systems |= {"ugv_controller": ugvs}
     systems |= {name: uavs[uav] for uav, name in _named("uav_controller", uavs).items()}
-    (planner,), (uav,) = planners.values(), uavs.values()
+    asks: System
+    flies: System
+    wires = []
+    if len(uavs) == 1:
+        (asks,), (flies,) = planners.values(), uavs.values()
+    else:
+        asks, flies = AllProposals([*uavs], len(presets)), Multiplexer([3] * len(uavs))
+        systems |= {"all_proposals": asks, "uav_command": flies}
+        for k, uav in enumerate(uavs):
+            wires.append((planners[uav].GetOutputPort("proposals"), asks.GetInputPort(f"proposals_{uav}")))
+            wires.append((uavs[uav].GetOutputPort("command"), flies.get_input_port(k)))
     named = {
         "reference": reference.get_output_port(),
-        "proposals": planner.GetOutputPort("proposals"),
+        "proposals": asks.GetOutputPort("proposals"),
         "ugv_command": ugvs.GetOutputPort("command"),
         "executing": ugvs.GetOutputPort("executing"),
         **({"command_share": ugvs.GetOutputPort("command_share")} if ugvs.HasOutputPort("command_share") else {}),
         "gains": ugvs.GetOutputPort("gains"),
-        "uav_command": uav.GetOutputPort("command"),
+        "uav_command": flies.get_output_port(0),
     }
-    return _assembled("task_planning", systems, named)
+    return _assembled("task_planning", systems, named, None, wires)
 
 
 def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:
@@ -356,6 +372,7 @@ def _uav_controller(scenario: Scenario, world: World, name: str) -> UavControlle
         world,
         components.make_avoidance(scenario),
         uav=name,
+        ugvs=scenario.in_charge(name),
         task=UAV_TASKS.load(uav.task, of=Task),
         gain=scenario.control.formation_gain_1_s,
         altitude=uav.altitude_m,

@@ -96,9 +96,10 @@ def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator
         yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
     for name, uav in scenario.aerial.items():
         if stalls:
-            centroid = np.mean([trace.position(ugv)[-1] for ugv in trace.ugvs], axis=0)
+            centroid = np.mean([trace.position(ugv)[-1] for ugv in scenario.in_charge(name)], axis=0)
             over = centroid + np.array([0.0, 0.0, uav.altitude_m])
-            yield _within(trace, name, "over the centroid of the UGVs", over, arrival)
+            whose = "its UGVs" if len(scenario.aerial) > 1 else "the UGVs"
+            yield _within(trace, name, f"over the centroid of {whose}", over, arrival)
         else:
             yield _within(trace, name, "at its target", uav.target_m, arrival)
 
