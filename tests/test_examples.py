@@ -18,6 +18,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from airground_drake.check.command import checked
+from airground_drake.check.line import AGREES
 from airground_drake.report.__main__ import main
 from airground_drake.report.model import of
 from airground_drake.report.screen import first_screen
@@ -130,6 +132,18 @@ def test_a_robot_on_wheels_holds_what_it_declares(tmp_path: Path) -> None:
     assert re.search(
         r"tb showed 0\.0\d+ of 0\.1 m/s drift and 0\.101 of 0\.105 m cover", first_screen(of(report)).beware[-1]
     )
+
+
+def test_a_controller_of_ones_own_is_judged_by_its_steps(tmp_path: Path) -> None:
+    """All is as declared, though a pair came so near that a longer step would have broken its distance."""
+    options = ["-o", str(tmp_path / "report"), "--format", "json", "--allow-plugins"]
+    assert main([str(EXAMPLES / "own_controller.yaml"), *options]) == 0
+    report = json.loads((tmp_path / "report" / "report.json").read_text())
+    found = {(claim["id"], claim["run"]): claim for claim in report["claims"]}
+    assert {found[claim, "d"]["status"] for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-GOAL")} == {"holds"}
+    assert found["SAFE-TRACE", "d"]["exercised"] > 0
+    assert {found[claim, "d"]["status"] for claim in ("GATE-PLAN", "LIVE-HYP")} == {"not_run"}
+    assert {line.outcome for line in checked(tmp_path / "report", 60.0)} == {AGREES}
 
 
 def test_a_supervisor_of_priorities_gets_where_a_fixed_order_does_not() -> None:

@@ -319,6 +319,9 @@ PLANTS = Registry(
 
 AS_TOLD = PLANTS.own[0]  # the default: it moves as it is told
 
+# Controllers of the UGVs in place of the package's own: subclasses of Drake's System.
+UGV_CONTROLLERS = Registry("controller", "ugv_controllers", {})
+
 # Samplers of points in the search for violations: classes that meet `study.campaign.search.Sampler`.
 SAMPLERS = Registry(
     "sampler",

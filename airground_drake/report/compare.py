@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -94,7 +93,7 @@ def rounded(changes_of: Mapping[str, Any], part: str) -> list[Change]:
 def _inputs(before: Report, after: Report) -> Iterator[Change]:
     """Keys of the scenario, versions and third-party files that differ: what the reports were made from."""
     old, new = (
-        {key: value for key, value in asdict(report.scenario.resolved).items() if key not in NO_INPUTS}
+        {key: value for key, value in report.scenario.resolved.data().items() if key not in NO_INPUTS}
         | {f"version of {key}": value for key, value in report.provenance.items() if key in VERSIONS}
         | {f"SHA-256 of {name}": digest for name, digest in report.provenance.get("third_party", {}).items()}
         for report in (before, after)

@@ -17,7 +17,7 @@ from airground_drake.report.model import SCHEMA
 from airground_drake.report.sentences import counted
 from airground_drake.scenario.document import place_of, way
 from airground_drake.scenario.plugins import OPTION
-from airground_drake.scenario.schema import Scenario, plain
+from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
 
@@ -51,7 +51,7 @@ def build(
         for verdict in verdicts
     ]
     items = sorted(map(dict, audit), key=lambda item: item["id"])
-    resolved = plain(scenario)
+    resolved = scenario.data()
     about = {key: resolved[key] for key in ("name", "title", "description")}
     runs = {name: _run(scenario, trace) for name, trace in traces.items()}
     numbers = expected_numbers(scenario, runs)

@@ -30,7 +30,6 @@ from airground_drake.report.sentences import MARKS, grouped, unbroken
 from airground_drake.report.templating import environment_of
 from airground_drake.report.view import svg
 from airground_drake.report.view.canvas import DARK
-from airground_drake.scenario.schema import plain
 from airground_drake.ugv.reasons import WORDS
 
 STYLE, SCRIPT = "report.css", "report.js"  # the style sheet and the script of the page, among the templates
@@ -105,7 +104,7 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
     }
     return environment().get_template("report.html.j2").render(
         report=report,
-        resolved=plain(report.scenario.resolved),
+        resolved=report.scenario.resolved.data(),
         first=first_screen(report),
         linked={name: words for name, words in LINKS.items() if sections.get(name, True)},
         sections=[(name, title) for name, title in SECTIONS.items() if sections.get(name, True)],

@@ -19,7 +19,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenario import map_file, validate
 from airground_drake.scenario.document import Document, of_data, place_of, put, read, replace, simple, way
 from airground_drake.scenario.filled import filled
-from airground_drake.scenario.schema import SET, UNNAMED, Scenario, Vector, plain
+from airground_drake.scenario.schema import SET, UNNAMED, Scenario, Vector
 from airground_drake.scenario.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
@@ -97,7 +97,7 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"{type(scenario).__name__} is no Scenario")
-    return plain(scenario)
+    return scenario.data()
 
 
 def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -> Scenario:

@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.files import sha256
-from airground_drake.base.registry import PLANTS, POLICIES, ROUTES, UAV_TASKS, Registry, is_plugin, source_of
+from airground_drake.base.registry import (
+    PLANTS,
+    POLICIES,
+    ROUTES,
+    UAV_TASKS,
+    UGV_CONTROLLERS,
+    Registry,
+    is_plugin,
+    source_of,
+)
 
 if TYPE_CHECKING:  # pydantic, which the schema imports, would delay `report --list`
     from airground_drake.scenario.schema import Scenario
@@ -31,6 +40,8 @@ def plugins(scenario: Scenario) -> dict[str, str]:
         (f"{scenario.key_of(name)}.task", uav.task, UAV_TASKS) for name, uav in scenario.aerial.items()
     ]
     named.append(("gatekeeper.route", scenario.gatekeeper.route, ROUTES))
+    if scenario.ugv_controller is not None:
+        named.append(("ugv_controller.kind", scenario.ugv_controller.kind, UGV_CONTROLLERS))
     for name, robot in scenario.robots.items():
         named += [(f"{scenario.key_of(name)}.plant.kind", plant.kind, PLANTS) for plant in robot.plant]
     for index, policy in enumerate(scenario.intervention.policies):
@@ -96,7 +107,7 @@ def beside(source: str, *, allow: bool) -> Iterator[None]:
 
 
 def without(scenario: Scenario) -> Scenario:
-    """The scenario with the package's own task, route and plants, without policies; its diagram has the same blocks."""
+    """The scenario with the package's own parts, without policies; its diagram has the same blocks."""
     plants = {name: [part for part in robot.plant if not part.is_own] for name, robot in scenario.robots.items()}
     uav = scenario.uav and replace(scenario.uav, task="formation", plant=plants[scenario.uav.name])
     return replace(
@@ -105,6 +116,7 @@ def without(scenario: Scenario) -> Scenario:
         uav=uav,
         uavs={name: replace(uav, task="formation", plant=plants[name]) for name, uav in scenario.uavs.items()},
         intervention=replace(scenario.intervention, policies=[]),
+        ugv_controller=None,
         gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0, solver="daqp"),
         runs={name: replace(run, set={}) for name, run in scenario.runs.items()},
         choices=[],

@@ -15,7 +15,15 @@ from pydantic import ConfigDict, Field
 
 from airground_drake.base.files import sha256
 from airground_drake.base.limits import MAX_CORNERS, MAX_RECTANGLES, MAX_STAGES, MAX_UGVS
-from airground_drake.base.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, UAV_TASKS
+from airground_drake.base.registry import (
+    METHODS,
+    MODEL_CLAIMS,
+    POLICIES,
+    ROUTES,
+    RUN_CLAIMS,
+    UAV_TASKS,
+    UGV_CONTROLLERS,
+)
 from airground_drake.base.values import (
     Count,
     CountFromZero,
@@ -70,6 +78,10 @@ UNNAMED = "uav"
 SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+OPTIONAL: dict[str, object] = {
+    "ugv_controller": None, "uav": None, "uavs": {}, "ugvs": [], "lost_at_s": 0.0, "uav_m": 0.0,
+}  # fmt: skip
+"""Keys that may be left out, and their values then: a scenario is written and digested as if these did not exist."""
 SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
@@ -306,6 +318,19 @@ class Control:
 
 
 @dataclass(slots=True)
+class OwnController:
+    """A controller of the user's own for all UGVs, a Drake System with the outputs of the package's.
+
+    Distances and the steps of a run are judged as any; claims about the package's law and its predictions are not run.
+    """
+
+    kind: Annotated[Words, registered(UGV_CONTROLLERS)]
+    """Its class: `module:Class` or `file.py:Class`."""
+    parameters: dict[Name, Real] = field(default_factory=dict)
+    """Numbers for its class, by name."""
+
+
+@dataclass(slots=True)
 class Threshold:
     """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(18).
 
@@ -515,16 +540,9 @@ class Choice:
     """The reason for the value."""
 
 
-# Keys of several UAVs, which are not written where they have these values.
-_ABSENT: dict[str, object] = {"uav": None, "uavs": {}, "ugvs": [], "lost_at_s": 0.0, "uav_m": 0.0}
-
-
-def plain(scenario: "Scenario") -> dict[str, Any]:
-    """A scenario as nested dicts and lists, with all defaults but those of keys that only several UAVs need."""
-    return asdict(
-        scenario,
-        dict_factory=lambda items: {k: value for k, value in items if k not in _ABSENT or value != _ABSENT[k]},
-    )
+def _written(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A mapping of a file, without optional keys that are left out."""
+    return {key: value for key, value in items if key not in OPTIONAL or value != OPTIONAL[key]}
 
 
 @dataclass(slots=True)
@@ -570,6 +588,8 @@ class Scenario:
     """Distances to keep."""
     control: Control = field(default_factory=Control)
     """The controllers."""
+    ugv_controller: OwnController | None = None
+    """A controller of your own, in place of the package's."""
     decision: Decision = field(default_factory=Decision)
     """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)
@@ -587,10 +607,14 @@ class Scenario:
     choices: list[Choice] = field(default_factory=list)
     """Origins of values that are not from the paper."""
 
+    def data(self) -> dict[str, Any]:
+        """The scenario as nested dicts and lists, with all defaults."""
+        return asdict(self, dict_factory=_written)
+
     @property
     def digest(self) -> str:
         """SHA-256 of the scenario as nested dicts and lists in strict JSON, with all defaults and without spaces."""
-        text = json.dumps(plain(self), separators=(",", ":"), allow_nan=False)
+        text = json.dumps(self.data(), separators=(",", ":"), allow_nan=False)
         return sha256(text.encode())
 
     @property

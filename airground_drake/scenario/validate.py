@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import pairwise, starmap
@@ -582,7 +581,7 @@ def _reproduction(scenario: Scenario) -> Problems:
 
 
 def _choices(scenario: Scenario) -> Problems:
-    keys = set(_keys(asdict(scenario))) if scenario.choices else set()
+    keys = set(_keys(scenario.data())) if scenario.choices else set()
     for index, choice in enumerate(scenario.choices):
         if choice.key not in keys:
             yield f"choices.{index}.key", choice.key, "a key of this scenario, such as control.period_s"

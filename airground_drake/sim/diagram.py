@@ -39,6 +39,7 @@ from airground_drake.sim.blocks import (
     UgvController,
     VelocityDisturbance,
 )
+from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvController
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
 
 # Exported output ports of the diagram: the signals of a trace.
@@ -67,7 +68,7 @@ class Model:
     trigger: EventTrigger  # of all UGVs
     planners: Mapping[str, InterventionPlanner]  # of each UAV, by its name
     gatekeeper: Gatekeeper | None  # of methods (c) and (d), else None
-    controllers: tuple[UgvController | UavController, ...]  # of the UGVs, and of each UAV
+    controllers: tuple[UgvController | OwnUgvController | UavController, ...]  # of the UGVs, and of each UAV
     signals: tuple[str, ...]  # names of the columns of `plant_signals` and `own_headings`
     recorded: tuple[str, ...]  # names of the exported output ports that are the signals of a trace
 
@@ -79,6 +80,7 @@ def build_diagram(
     plants: Mapping[str, OwnPlant] = NO_PLANTS,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    ugv_controller: ControllerFactory | None = None,
 ) -> Diagram:
     """The diagram of a scenario, for inspection, simulation or embedding.
 
@@ -89,6 +91,8 @@ def build_diagram(
         plants: plants of your own, by robot, in place of those of the scenario.
         monitor: watches the diagram while it runs; see `make_monitor`.
         decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
+        ugv_controller: makes a controller of your own for all UGVs, in place of that of the scenario: a System with the
+            output ports of `UgvController`, whose input ports are fed by name; see docs/extending.md.
 
     Returns:
         A Diagram whose default context has every robot at its start. For a simulation its context needs an accuracy:
@@ -100,10 +104,11 @@ def build_diagram(
     Raises:
         ScenarioError: if the scenario is not valid.
         UnknownNameError: if there is no such method or composition.
-        PluginError: if a policy, route, task or plant of the scenario cannot be made, or the decision block does not
-            have the ports of one.
+        PluginError: if a policy, route, task, plant or controller of the scenario cannot be made, or the decision block
+            or the controller does not have the ports of one.
     """
-    return build_model(declared(scenario, plants), method, composition, plants, monitor, decision_block).diagram
+    valid = declared(scenario, plants, ugv_controller)
+    return build_model(valid, method, composition, plants, monitor, decision_block, ugv_controller).diagram
 
 
 def build_model(
@@ -113,14 +118,15 @@ def build_model(
     plants: Mapping[str, OwnPlant] = NO_PLANTS,
     monitor: Monitor | None = None,
     decision_block: DecisionFactory = DecisionVariable,
+    ugv_controller: ControllerFactory | None = None,
     *,
     disturbed: bool = True,
     make_gatekeepers: components.GatekeepersFactory = components.make_gatekeepers,
 ) -> Model:
     """Build and wire all components of one method of a valid scenario; see `build_diagram`."""
-    # `plants` are those that the scenario declares (`sim.blocks.plant.declared`). Without `disturbed` the diagram has
-    # no inputs for disturbances: commands go straight to the plants. `make_gatekeepers` replaces the gatekeepers;
-    # claims about decisions are about the default.
+    # `plants` and `ugv_controller` are what the scenario declares (`sim.blocks.plant.declared`). Without `disturbed`
+    # the diagram has no inputs for disturbances: commands go straight to the plants. `make_gatekeepers` replaces the
+    # gatekeepers; claims about decisions are about the default.
     chosen, composition = _chosen(scenario, method, composition)
     world, presets = make_world(scenario), components.make_presets(scenario)
     n = len(world.names("ugv"))
@@ -150,7 +156,9 @@ def build_model(
         gatekeeper = Gatekeeper(make_gatekeepers(scenario, law), world, **periods)
     answering = DirectAcceptance(n) if gatekeeper is None else gatekeeper
     answers = {name: answering.GetOutputPort(name) for name in ("answers", "reports")}
-    ugvs, uavs = UgvController(world, law), {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
+    own = scenario.ugv_controller
+    ugvs = OwnUgvController(own, world, law, ugv_controller) if own else UgvController(world, law)
+    uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
     parts = {
         "decision_making": decision,
         "task_planning": _task_planning(presets, planners, ugvs, uavs),
@@ -160,6 +168,8 @@ def build_model(
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
+    if isinstance(ugvs, OwnUgvController):
+        ugvs.require_inputs(named)
     recorded = (*RECORDED, *(name for name in OF_PLANTS if name in named))
     exported = [*recorded, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
@@ -214,7 +224,7 @@ def _decision_making(scenario: Scenario, n: int, variable: System, events: Event
 def _task_planning(
     presets: Sequence[Motion],
     planners: Mapping[str, InterventionPlanner],
-    ugvs: UgvController,
+    ugvs: UgvController | OwnUgvController,
     uavs: Mapping[str, UavController],
 ) -> Diagram:
     """The task planning layer: preset trajectories, planners, controllers."""
@@ -352,9 +362,13 @@ def make_monitor(
         terminate: end the simulation at the first violation.
 
     Raises:
-        ScenarioError, UnknownNameError, PluginError: as `build_diagram`.
+        ScenarioError, UnknownNameError, PluginError: as `build_diagram`; also if the UGVs have a controller of the
+            user's: no law is known that it must obey.
     """
     scenario = validated(scenario)
+    if scenario.ugv_controller is not None:
+        told = f"ugv_controller {scenario.ugv_controller.kind!r} has no law that is known here"
+        raise PluginError(f"{told}; allowed for a monitor: a scenario without one")
     chosen, composition = _chosen(scenario, method, composition)
     world = make_world(scenario)
     ugvs = UgvController(world, components.make_law(scenario, chosen, composition))

@@ -15,11 +15,15 @@ from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.motion import PeriodMotion
 from airground_drake.model.bodies.world import ROBOTS, Body
 from airground_drake.model.geometry import convex, outline
+from airground_drake.model.geometry.encounter import least_apart
 from airground_drake.scenario.schema import MAP
 from airground_drake.scenario.world import make_world
 from airground_drake.sim.collisions import first_collisions
 from airground_drake.sim.trace import Trace
 from airground_drake.ugv.reasons import OVER
+
+FEW = 8  # a shape of so many convex parts is first looked at as a whole: most robots come near to nothing
+ROUNDING_M = 1e-9  # what such a look leaves for rounding, m
 
 
 def extract(trace: Trace) -> list[dict[str, Any]]:
@@ -40,12 +44,12 @@ def extract(trace: Trace) -> list[dict[str, Any]]:
     for ugv, issued, policy in zip(*sent, strict=True):
         add(issued, ugv, "proposal", policy=policy)
     previous: dict[int, str] = {}
-    columns = ["t_s", "robot", "policy", "number", "decision", "reason", "status"]
-    for row in trace.decisions[columns].to_dict("records"):
-        if previous.get(row["number"]) != row["decision"]:
-            previous[row["number"]] = row["decision"]
-            kind = OVER if row["reason"] == OVER else row["decision"]
-            add(row["t_s"], row["robot"], kind, policy=row["policy"], status=row["status"])
+    columns = ("t_s", "robot", "policy", "number", "decision", "reason", "status")
+    decided = (trace.decisions[name].tolist() for name in columns)
+    for when, robot, policy, number, decision, reason, status in zip(*decided, strict=True):
+        if previous.get(number) != decision:
+            previous[number] = decision
+            add(when, robot, OVER if reason == OVER else decision, policy=policy, status=status)
     _add_collisions(trace, add)
     hits = first_collisions(events)
     for robot in trace.robots:
@@ -110,6 +114,8 @@ def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> np
     """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them."""
     # apart: (T - 1, 3), m; shape: (k, W); within: m
     places = np.concatenate([apart.start, apart.end[-1:]])
+    if len(shape) <= FEW and not any(_may_be_within(places, row, within + apart.off_m, planar) for row in shape):
+        return np.empty(0, dtype=np.intp)
     near, passes = np.zeros(len(places), dtype=bool), np.zeros(len(apart.start), dtype=bool)
     longest = float(np.linalg.norm(apart.end - apart.start, axis=1).max())
     far = 1.001 * (within + apart.off_m + longest + shape[:, outline.RADIUS] + shape[:, outline.EXTENT])
@@ -124,3 +130,7 @@ def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> np
         passes[some] |= least < reach + apart.off_m
     enters = near & ~np.append(False, near[:-1])
     return np.flatnonzero(enters | np.append(passes & ~near[:-1] & ~near[1:], False))
+
+
+def _may_be_within(places: Array, row: Array, within: float, planar: bool) -> bool:
+    return bool(least_apart(row, places, planar) < within + row[outline.RADIUS] + ROUNDING_M)

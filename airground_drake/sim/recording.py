@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -27,6 +27,7 @@ from airground_drake.sim.tables import (
     PROBLEM_SCALARS,
     PROPOSAL_COLUMNS,
     SCHEMA,
+    listed,
     typed,
 )
 from airground_drake.sim.trace import Trace
@@ -54,10 +55,11 @@ SAME_S = 1e-6  # a row this near to a multiple of the control period is at that 
 
 
 def trace_of(
-    scenario: Scenario, name: str, world: World, done: Done, signals: Sequence[str], own_plants: Iterable[str] = ()
+    scenario: Scenario, name: str, world: World, done: Done, signals: Sequence[str], own_plants: Collection[str] = ()
 ) -> Trace:
     """The trace of a run of a scenario; `signals` as of `states`, `own_plants` are robots with users' plants."""
     run, ugvs = scenario.runs[name], world.names("ugv")
+    given = replace(own(scenario, name), duration_s=done.until_s)
     keep = distinct(done.t, done.logged["team_command"])
     t, logged = done.t[keep], {port: rows[:, keep] for port, rows in done.logged.items()}
     rows = states(t, logged, ugvs, [body.name for body in world.moving], signals)
@@ -78,14 +80,15 @@ def trace_of(
     trace = Trace(
         meta,
         states=rows,
-        samples=sampled.assign(**measured(rows, sampled, own_plants)),
-        decisions=decisions(done.decided, ugvs, own(scenario, name).gatekeeper.route),
+        samples=sampled.assign(**measured(rows, sampled, own_plants)) if own_plants else sampled,
+        decisions=decisions(done.decided, ugvs, given.gatekeeper.route),
         timings={"wall_s": done.wall_s, "decision_times_s": [decision.cpu_s for decision in done.decided]},
         problems=problems(done.decided),
         proposals=proposals(ugvs, done.memories.values()),
         plans=plans(done.memories, ugvs),
     )
     trace = replace(trace, messages=messages(done.memories.values(), trace))
+    trace.derived("scenario", lambda: given)  # it need not be read from the metadata
     meta["events"] = extract(trace)
     return trace
 
@@ -166,11 +169,13 @@ def decisions(decided: Sequence[GatekeeperDecision], ugvs: Sequence[str], route:
     return typed([_decision(made, ugvs[made.robot], route) for made in decided], DECISION_COLUMNS, *DECISION_LISTS)
 
 
+_BLANK: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
+
+
 def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str, Any]:
     """A row of `Trace.decisions`."""
-    row: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in DECISION_COLUMNS.items()}
     rested_on = decision.basis
-    row |= {
+    row: dict[str, Any] = _BLANK | {
         "t_s": decision.t,
         "robot": robot,
         "policy": decision.proposal.policy,
@@ -236,7 +241,7 @@ def problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:
         )
         for p, s in planned
     ]  # fmt: skip
-    return pd.DataFrame(rows, columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS])
+    return listed(rows, (*PROBLEM_SCALARS, *PROBLEM_ARRAYS))
 
 
 def _sent(memories: Iterable[PlannerState]) -> list[tuple[int, Proposal]]:
@@ -256,7 +261,7 @@ def proposals(ugvs: Sequence[str], memories: Iterable[PlannerState]) -> pd.DataF
         )
         for i, proposal in _sent(memories)
     ]  # fmt: skip
-    return pd.DataFrame(rows, columns=list(PROPOSAL_COLUMNS))
+    return listed(rows, PROPOSAL_COLUMNS)
 
 
 def plans(memories: Mapping[str, PlannerState], ugvs: Sequence[str]) -> pd.DataFrame:
@@ -308,7 +313,8 @@ def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[s
         }  # fmt: skip
 
     read, never = dict(read for memory in memories for read in memory.read), float("nan")
-    decided = trace.decisions.groupby("number")["t_s"].min().to_dict()
+    latest_first = (trace.decisions[name].tolist()[::-1] for name in ("number", "t_s"))
+    decided = dict(zip(*latest_first, strict=True))  # when each was decided on first
     for i, proposal in sent:
         number, issued = proposal.number, proposal.issued
         if trace.meta["method"] == "b":  # accepted at once
@@ -320,7 +326,8 @@ def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[s
     withdrawn = sorted((gone for memory in memories for gone in memory.withdrawn), key=lambda gone: gone[1])
     for count, (number, t) in enumerate(withdrawn):
         yield row("withdrawal", count, number, t, t)
-    for t, answer, number in zip(*(trace.decisions[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
+    told = trace.decisions[trace.decisions["answer"] >= 0]
+    for t, answer, number in zip(*(told[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
         yield row("answer", answer, number, t, read.get(answer, never))
 
 

@@ -11,10 +11,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, System
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from airground_drake.base.errors import SimulationError, UnknownNameError, described, raised_as
+from airground_drake.base.registry import UGV_CONTROLLERS
 from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
@@ -26,7 +27,8 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.sim.blocks.decision import ACCURACY, DecisionVariable
 from airground_drake.sim.blocks.lifetime import untie
-from airground_drake.sim.blocks.plant import OwnPlant, declared, own_code
+from airground_drake.sim.blocks.own_controller import ControllerFactory
+from airground_drake.sim.blocks.plant import OwnPlant, code_of, declared, own_code
 from airground_drake.sim.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.sim.diagram import NO_PLANTS, DecisionFactory, Model, build_model
 from airground_drake.sim.recording import Done, trace_of
@@ -54,12 +56,13 @@ class Recorder:
         observers: Sequence[LeafSystem] = (),
         *,
         plants: Mapping[str, OwnPlant] = NO_PLANTS,
+        ugv_controller: ControllerFactory | None = None,
         make_gatekeepers: GatekeepersFactory = make_gatekeepers,
     ) -> None:
         """Build the model of a run of the scenario and its logger.
 
-        `scenario` is valid and declares the `plants` (`sim.blocks.plant.declared`). `decision_block`, `observers` and
-        `plants` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as `simulate`.
+        `scenario` is valid and declares `plants` and `ugv_controller` (`sim.blocks.plant.declared`). These,
+        `decision_block` and `observers` as in `simulate`, `make_gatekeepers` as in `build_model`; raises as `simulate`.
         """
         self._scenario, self._name = scenario, name
         if name not in self._scenario.runs:
@@ -73,10 +76,15 @@ class Recorder:
             composition,
             plants,
             decision_block=decision_block,
+            ugv_controller=ugv_controller,
             disturbed=False,
             make_gatekeepers=make_gatekeepers,
         )
         self._own_plants = own_code(self._own, plants)
+        self._own_code = dict(self._own_plants)
+        if given := self._own.ugv_controller:
+            make = ugv_controller or UGV_CONTROLLERS.load(given.kind, System)
+            self._own_code["the UGVs"] = code_of(given.kind, make)
         builder = DiagramBuilder()
         builder.AddSystem(self.model.diagram)
         ports = [self.model.diagram.GetOutputPort(name) for name in self.model.recorded]
@@ -156,12 +164,12 @@ class Recorder:
         return raised_as(lambda error: SimulationError(self._name, context.get_time(), self._what(error)))
 
     def _what(self, error: BaseException) -> str:
-        """An error in words, with the place in the file of a user's plant, and such plants by name."""
-        own = self._own_plants
+        """An error in words, with the place in the file of a user's plant or controller, and such code by name."""
+        own = self._own_code
         what = max((described(error, code.function) for code in own.values()), key=len, default=described(error))
         if not own or any(code.name in what for code in own.values()):
             return what
-        return f"{what} (users' plants: {', '.join(f'{code.name} of {robot}' for robot, code in own.items())})"
+        return f"{what} (users' code: {', '.join(f'{code.name} of {robot}' for robot, code in own.items())})"
 
     def trace(self, simulator: Simulator, seed: int | None, wall: float = 0.0) -> Trace:
         """The trace of what a simulator has simulated: of a run that lasts until now.
@@ -229,6 +237,7 @@ def simulate(
     observers: Sequence[LeafSystem] = (),
     speed: float = 0.0,
     plants: Mapping[str, OwnPlant] = NO_PLANTS,
+    ugv_controller: ControllerFactory | None = None,
     engine: Engine = "drake",
 ) -> Trace:
     """Simulate one run of a scenario.
@@ -244,25 +253,27 @@ def simulate(
         speed: simulated seconds per second at most, for watching; 0: no limit.
         plants: plants of your own, by robot, in place of those of the scenario: as if the scenario named them
             (`plant.kind`).
+        ugv_controller: makes a controller of your own for all UGVs, as if the scenario named it; see `build_diagram`.
         engine: 'drake' is Drake's Simulator; 'batch' makes the same trace, bit by bit, in a compiled loop, several
             times faster. What the loop cannot make (see docs/campaigns.md) Drake makes.
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
         UnknownNameError: if it has no such run, or there is no such engine.
-        PluginError: if it names a policy, route, task or plant that cannot be made, or the decision block has other
-            ports.
+        PluginError: if it names a policy, route, task, plant or controller that cannot be made, or the decision block
+            or the controller has other ports.
         SimulationError: if Drake or a system stops; names the run and the time.
     """
     if engine not in ENGINES:
         raise UnknownNameError("engine", engine, ENGINES)
     if seed is not None:
         scenario = validated(scenario, {"seed": seed})
-    valid = declared(scenario, plants)
+    valid = declared(scenario, plants, ugv_controller)
     if engine == "batch" and run in valid.runs and decision_block is DecisionVariable and not (observers or speed):
         with suppress(LeftToDrakeError):
             trace = Batch(valid, run).simulate()
             if watch is not None:
                 watch(valid.duration_s)
             return trace
-    return Recorder(valid, run, decision_block, observers, plants=plants).simulate(watch=watch, speed=speed)
+    recorder = Recorder(valid, run, decision_block, observers, plants=plants, ugv_controller=ugv_controller)
+    return recorder.simulate(watch=watch, speed=speed)

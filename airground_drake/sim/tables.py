@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,8 @@ DECISION_COLUMNS = {
 }
 DECISION_LISTS = ("sensed", "known", "new", "told", "asked", "asked_accepted")
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
-that of `Trace.proposals`, `answer` the number of an answer in `Trace.messages`. Columns up to
+that of `Trace.proposals`, `answer` that of the answer in `Trace.messages` that told the UAV of the decision, -1 where
+it changed nothing. Columns up to
 `predicted_clearance_m` belong to decisions by problem (26), the others to decisions by outcomes: the outcome of either
 choice by `ugv.outcome` (cost, 1 if the UGV comes to rest short of its goal, way left), and the number of tries
 since the UGV last rested.
@@ -105,8 +107,8 @@ MESSAGE_COLUMNS = {
 - sender, receiver: names of robots.
 - about: number of the proposal.
 - sent_s, received_s, read_s: times, s; NaN for a message that was lost, or never read. A UGV reads a proposal when its
-  gatekeeper decides on it for the first time. Under method (b) it reads it when it begins to execute it, and does not
-  answer."""
+  gatekeeper decides on it for the first time, and answers when its answer changes or it senses an obstacle that the UAV
+  does not know. Under method (b) it reads it when it begins to execute it, and does not answer."""
 
 PLAN_COLUMNS = {"t_s": "float64", "uav": "str", "ugv": "str", "policy": "str", "outcome": "str", "reason": "str"}
 """Columns of `Trace.plans`, one row per policy that was asked for a plan for a UGV: the outcome is proposed, passed
@@ -124,11 +126,39 @@ TABLES = ("states", "samples", "seen", "messages", "proposals", "plans", "decisi
 """Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""
 
 
+TEXT: Any = pd.Series(dtype="str").dtype
+
+
 def typed(rows: Sequence[Mapping[str, Any]], kinds: Mapping[str, str], *lists: str) -> pd.DataFrame:
     """A table of rows with columns of some kinds, and columns whose cells are lists."""
-    # Each column is made with its type: `astype` for all of them takes three times as long.
+    # Each column is made with its type: Series, or `astype` for all of them, take three times as long.
+    if not rows:
+        return _empty(*kinds.items(), *((name, "object") for name in lists)).copy()
+    return _columns(rows, {**kinds, **dict.fromkeys(lists, "object")})
+
+
+@cache
+def _empty(*kinds: tuple[str, str]) -> pd.DataFrame:
+    return _columns([], dict(kinds))
+
+
+def _columns(rows: Sequence[Mapping[str, Any]], kinds: Mapping[str, str]) -> pd.DataFrame:
     columns: dict[str, Any] = {}
-    for name, kind in {**kinds, **dict.fromkeys(lists, "object")}.items():
+    for name, kind in kinds.items():
         cells = [row[name] for row in rows]
-        columns[name] = np.array(cells, kind) if kind not in ("str", "object") else pd.Series(cells, dtype=kind)
+        if kind == "object":
+            columns[name] = np.empty(len(cells), dtype=object)
+            columns[name][:] = cells
+        else:
+            columns[name] = pd.array(cells, dtype=TEXT) if kind == "str" else np.array(cells, kind)
     return pd.DataFrame(columns)
+
+
+def listed(rows: Sequence[tuple[Any, ...]], columns: tuple[str, ...]) -> pd.DataFrame:
+    """A table of rows with columns of any type."""
+    return pd.DataFrame(rows, columns=list(columns)) if rows else _none(columns).copy()
+
+
+@cache
+def _none(columns: tuple[str, ...]) -> pd.DataFrame:
+    return pd.DataFrame(columns=list(columns))

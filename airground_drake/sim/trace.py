@@ -70,6 +70,7 @@ from airground_drake.sim.tables import (
     SCHEMA,
     SEEN_COLUMNS,
     TABLES,
+    listed,
     typed,
 )
 
@@ -108,8 +109,8 @@ class Trace:
     samples: pd.DataFrame
     decisions: pd.DataFrame
     timings: dict[str, Any] = field(default_factory=dict, compare=False)
-    problems: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=[*PROBLEM_SCALARS, *PROBLEM_ARRAYS]))
-    proposals: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=list(PROPOSAL_COLUMNS)))
+    problems: pd.DataFrame = field(default_factory=lambda: listed([], (*PROBLEM_SCALARS, *PROBLEM_ARRAYS)))
+    proposals: pd.DataFrame = field(default_factory=lambda: listed([], PROPOSAL_COLUMNS))
     messages: pd.DataFrame = field(default_factory=lambda: typed([], MESSAGE_COLUMNS))
     plans: pd.DataFrame = field(default_factory=lambda: typed([], PLAN_COLUMNS, "sent"))
     seen: pd.DataFrame = field(default_factory=lambda: typed([], SEEN_COLUMNS))

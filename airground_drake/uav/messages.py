@@ -40,7 +40,7 @@ class Sighting(NamedTuple):
 class Report(NamedTuple):
     """A UGV's report, sent with its answer."""
 
-    number: int = -1  # of the answer, which counts the answers of all UGVs; -1: no answer
+    number: int = -1  # of the answer; the answers of all UGVs are counted together; -1: no answer
     sensed: tuple[Outline, ...] = ()  # obstacles at rest that the UGV sensed when it decided
     reason: str = ""  # why it answers so, see `ugv.answer.Reason`; empty before it has decided
     words: str = ""  # the reason as a sentence

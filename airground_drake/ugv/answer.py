@@ -67,7 +67,7 @@ class GatekeeperDecision:
     refuse: Outcome | None = None  # outcome of refusing; None if no outcomes were compared
     accept: Outcome | None = None  # outcome of accepting; None if no outcomes were compared
     tries: int = 0  # acceptances since the last rest, with this decision
-    answer: int = -1  # number of the answer, which counts the answers of all UGVs
+    answer: int = -1  # number of the answer by which the UAV is told of it; -1: it changes nothing
     basis: Basis = field(default_factory=Basis)  # what the prediction rested on
     # CPU time of prediction and decision, s, in which identical runs differ
     cpu_s: float = field(default=0.0, compare=False)

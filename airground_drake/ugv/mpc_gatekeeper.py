@@ -44,12 +44,13 @@ class GatekeeperState:
 
     answers: tuple[float, ...]  # in force, (2n,), see `messages`
     since: tuple[float, ...]  # when each UGV's answer became what it is, (n,), s
-    reports: Reports  # what came with them
+    reports: Reports  # what each UGV last told the UAV about its proposal
+    told: int = 0  # answers sent so far
     decisions: tuple[GatekeeperDecision, ...] = ()  # those of the last sample that was not idle
     commitments: tuple[Commitment, ...] = ()  # under method (d), each UGV's tries and rests
     # under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m)
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
-    # all decisions of the run so far; the number of an answer is the index of its decision
+    # all decisions of the run so far
     made: tuple[GatekeeperDecision, ...] = ()
 
     @classmethod
@@ -80,7 +81,10 @@ class Gatekeepers(abc.ABC):
 
     Attributes:
         law: their control law, with the scenario's gains.
+        unreported: names of obstacles that move and that the UAV sees itself.
     """
+
+    unreported: frozenset[str] = frozenset()
 
     def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
         self.law = law
@@ -118,17 +122,46 @@ class Gatekeepers(abc.ABC):
             or convex.distances(near.parts[part, None], own - now.positions[near.carrier[part]], True)[0] <= reach
         ], dtype=np.intp)  # fmt: skip
 
-    def _report(self, now: Inputs, decision: GatekeeperDecision) -> Report:
-        """The report with an answer: the obstacles within sensing range, and the reason."""
-        i = decision.robot
+    def _answered(
+        self, now: Inputs, before: GatekeeperState, judged: Sequence[tuple[GatekeeperDecision, float]]
+    ) -> GatekeeperState:
+        """The state after the decisions of a sample, with the verdicts that follow from them."""
+        n, told = len(now.proposals), before.told
+        answers, reports, decisions = [SILENT, -1.0] * n, [Report()] * n, list[GatekeeperDecision]()
+        for decision, verdict in judged:
+            i, number = decision.robot, decision.proposal.number
+            news = self._news(now, before, decision, verdict)
+            if news is not None:
+                decision, told = replace(decision, answer=told), told + 1
+                news = news._replace(number=decision.answer)
+            reports[i] = news or before.reports[i]
+            decisions.append(decision)
+            answers[2 * i : 2 * i + 2] = verdict, number
+        return replace(
+            before, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), told=told,
+            made=(*before.made, *decisions),
+        )  # fmt: skip
+
+    def _news(
+        self, now: Inputs, before: GatekeeperState, decision: GatekeeperDecision, verdict: float
+    ) -> Report | None:
+        """The report of another answer than before, or of obstacles that the UAV does not know; else None."""
+        i, told = decision.robot, before.reports[decision.robot]
         near = self._near.still[self._in_range(decision.t, now.positions[i])]
-        seen: tuple[Sighting, ...] = ()
-        if len(self._world.moving) > len(self._world.robots):
-            beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
-            seen = tuple(
-                sighting for sighting in sightings(self._world, now.t, now.positions) if sighting.name in beside
-            )
-        return Report(decision.answer, tuple(map(outline.as_tuple, near)), decision.reason, in_words(decision), seen)
+        sensed, seen = tuple(map(outline.as_tuple, near)), self._seen(now, i)
+        if verdict == answer_to(decision.proposal, before.answers, i) and seen == told.seen:
+            new = [row for row, given in zip(near, sensed, strict=True) if given not in told.sensed]
+            if not new or outline.is_among(np.array(new), decision.proposal.mapped).all():
+                return None
+        return Report(-1, sensed, decision.reason, in_words(decision), seen)
+
+    def _seen(self, now: Inputs, i: int) -> tuple[Sighting, ...]:
+        """The obstacles that move, that a UGV senses, and that the UAV does not see."""
+        if len(self._world.moving) == len(self._world.robots):
+            return ()
+        beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
+        every = sightings(self._world, now.t, now.positions)
+        return tuple(sighting for sighting in every if sighting.name in beside - self.unreported)
 
     def _view(self, now: Inputs, i: int) -> View:
         """All obstacles at rest and robots around a UGV, and the obstacles that move within sensing range."""
@@ -169,28 +202,18 @@ class PaperGatekeepers(Gatekeepers):
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every proposal in force by (26)."""
-        answers: list[float] = []
         since: list[float] = []
-        reports: list[Report] = []
-        decisions: list[GatekeeperDecision] = []
+        judged: list[tuple[GatekeeperDecision, float]] = []
         budgets = self._rules.budgets(sum(p is not None for p in now.proposals))
         for i, proposal in enumerate(now.proposals):
             if proposal is None:
-                answers += [SILENT, -1.0]
                 since.append(now.t)
-                reports.append(Report())
                 continue
             decision = self._decide(now, before, i, proposal, budgets)
-            decision = replace(decision, answer=len(before.made) + len(decisions))
-            decisions.append(decision)
-            answer = ACCEPT if decision.accepted else REFUSE
-            answers += [answer, proposal.number]
-            since.append(before.since[i] if answer == answer_to(proposal, before.answers, i) else now.t)
-            reports.append(self._report(now, decision))
-        return replace(
-            before, answers=tuple(answers), since=tuple(since), reports=tuple(reports), decisions=tuple(decisions),
-            made=(*before.made, *decisions),
-        )  # fmt: skip
+            verdict = ACCEPT if decision.accepted else REFUSE
+            judged.append((decision, verdict))
+            since.append(before.since[i] if verdict == answer_to(proposal, before.answers, i) else now.t)
+        return replace(self._answered(now, before, judged), since=tuple(since))
 
     def _decide(
         self, now: Inputs, before: GatekeeperState, i: int, proposal: Proposal, budgets: Iterator[Budget]

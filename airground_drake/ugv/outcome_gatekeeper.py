@@ -35,7 +35,6 @@ from airground_drake.uav.messages import (
     REFUSE,
     SILENT,
     Proposals,
-    Report,
     answer_to,
 )
 from airground_drake.uav.policy import Proposal
@@ -81,18 +80,12 @@ class OutcomeGatekeepers(Gatekeepers):
             for i, proposal in enumerate(now.proposals)
             if proposal is not None
         ]
-        answers, reports = [SILENT, -1.0] * len(said), [Report()] * len(said)
-        decisions: list[GatekeeperDecision] = []
+        verdicts: list[tuple[GatekeeperDecision, float]] = []
         for decision in _jointly(judged, said):
             i = decision.robot
             held[i] = self._after(held[i], decision, said[i])
-            decisions.append(replace(decision, tries=held[i].tries, answer=len(before.made) + len(decisions)))
-            answers[2 * i : 2 * i + 2] = _answer(decision, said[i]), decision.proposal.number
-            reports[i] = self._report(now, decisions[-1])
-        return replace(
-            known, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), commitments=tuple(held),
-            made=(*before.made, *decisions),
-        )  # fmt: skip
+            verdicts.append((replace(decision, tries=held[i].tries), _answer(decision, said[i])))
+        return replace(self._answered(now, known, verdicts), commitments=tuple(held))
 
     def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
         """Which outlines each UGV has sensed up to time t, s, (n, m), and has not seen to be gone since."""

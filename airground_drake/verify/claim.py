@@ -40,6 +40,14 @@ TIME_TOLERANCE_S = 1e-9
 # A claim may hold with a margin that is this much below 0, in its unit: claims allow for rounding.
 MARGIN_ROUNDING = 1e-6
 
+OWN = "ugv_controller"  # among the inputs of a claim about the package's law: the class that takes the law's place
+
+
+def unjudged(kind: str) -> Finding:
+    """That a claim about the package's law says nothing of a user's controller."""
+    why = f"the UGVs are commanded by {kind}: predictions, and proofs about the package's law, are not about it"
+    return Finding("not_run", evidence={"reason": why})
+
 
 class Claim(abc.ABC):
     """What a claim says of itself.
@@ -57,6 +65,8 @@ class Claim(abc.ABC):
         does_not_establish: what a reader must not conclude from it.
         expected: the status that a scenario expects unless it says otherwise.
         exercised_by: what its findings count as `exercised`, in words that follow a number; '' if they count nothing.
+        about_the_law: whether it is about the package's control law or its predictions: it is `not_run`, and that is
+            expected, where a controller of the user's own commands the UGVs.
     """
 
     id: str
@@ -71,6 +81,11 @@ class Claim(abc.ABC):
     summary: str = ""
     formula: str = ""
     latex: tuple[str, ...] = ()
+    about_the_law: bool = False
+
+    def due(self, own_controller: object) -> str:
+        """The status that is expected unless the scenario says otherwise; its `ugv_controller` is None without one."""
+        return self.expected if own_controller is None or not self.about_the_law else "not_run"
 
     def applies(self, about: Any) -> bool:
         """Whether the claim says anything about this trace, or scenario if it is about the model; else left out."""
@@ -128,7 +143,8 @@ class ModelClaim(Claim):
         """`inputs`; an exception, also of `applies`, becomes inputs that `judge` turns into the status `error`."""
         try:
             self.applies(scenario)
-            return self.inputs(scenario)
+            own = scenario.ugv_controller
+            return self.inputs(scenario) | ({OWN: own.kind} if own and self.about_the_law else {})
         except (Exception, SystemExit) as error:
             return {"error": described(error)}
 
@@ -136,6 +152,8 @@ class ModelClaim(Claim):
         """`check`, with exceptions turned into the status `error`."""
         if set(inputs) == {"error"}:
             return Finding("error", evidence=Failure(inputs["error"]))
+        if OWN in inputs:
+            return unjudged(inputs[OWN])
         return self.decided(lambda: self.check(inputs))
 
     def judge_run(self, trace: Trace) -> Any:
@@ -166,6 +184,8 @@ class TraceClaim(Claim):
         def find() -> Finding:
             require_motion(trace)
             self.applies(trace)
+            if self.about_the_law and (own := trace.scenario.ugv_controller):
+                return unjudged(own.kind)
             finding = self.check(trace)
             if finding.status in PASSING:
                 require_whole_run(trace)

@@ -16,7 +16,7 @@ from airground_drake.scenario.load import own
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.cache import cached_finding
-from airground_drake.verify.claim import ModelClaim, TraceClaim, Verdict
+from airground_drake.verify.claim import OWN, ModelClaim, TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.registry import model_claims, run_claims
 
@@ -59,9 +59,10 @@ def _applicable(trace: Trace, claims: Collection[str] | None = None) -> list[Tra
 
 def _verdicts(trace: Trace, claims: Sequence[TraceClaim], findings: Sequence[Finding]) -> list[Verdict]:
     run = str(trace.meta.get("run"))
-    expected = trace.meta.get("scenario", {}).get("runs", {}).get(run, {}).get("expected", {})
+    scenario = trace.meta.get("scenario", {})
+    expected, own = scenario.get("runs", {}).get(run, {}).get("expected", {}), scenario.get(OWN)
     return [
-        Verdict.of(claim, run, finding, expected.get(claim.id, claim.expected))
+        Verdict.of(claim, run, finding, expected.get(claim.id, claim.due(own)))
         for claim, finding in zip(claims, findings, strict=True)
     ]
 
@@ -158,7 +159,8 @@ class _Case(NamedTuple):
     def verdict(self, scenario: Scenario, finding: Finding) -> Verdict:
         """With what the scenario expects."""
         expected = scenario.runs[self.run].expected if self.run else scenario.expected
-        return Verdict.of(self.claim, self.run, finding, expected.get(self.claim.id, self.claim.expected), self.inputs)
+        due = expected.get(self.claim.id, self.claim.due(scenario.ugv_controller))
+        return Verdict.of(self.claim, self.run, finding, due, self.inputs)
 
 
 def _cases(scenario: Scenario, claims: Collection[str] | None = None) -> list[_Case]:

@@ -9,14 +9,14 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.outlines import CORNERS, COUNT, MIDDLE
+from airground_drake.verify.engines.outlines import CORNERS, COUNT, MIDDLE, Cores
 from airground_drake.verify.runs.demands import outlines_of
 from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import carried
 from airground_drake.verify.runs.proposals import proposals_of
 from oracles.fault import Fault
 from oracles.protocol import answers_to, lost_s, parties, withdrawn_s
-from oracles.sensing import are_there, beyond_range, still_parts
+from oracles.sensing import are_same, are_there, beyond_range, still_parts
 
 SENSED_M = 1e-9
 """Within this of the sensing range an obstacle may have been sensed or not, m."""
@@ -25,8 +25,8 @@ Part = tuple[float, ...]
 
 
 def wrong_messages(trace: Trace) -> list[Fault]:
-    """Proposals and decisions out of turn, and proposals whose map is not the UAV's."""
-    return [*_out_of_turn(trace), *_wrong_maps(trace)]
+    """Proposals, decisions and answers out of turn, and proposals whose map is not the UAV's."""
+    return [*_out_of_turn(trace), *_answered_otherwise(trace), *_wrong_maps(trace)]
 
 
 def _out_of_turn(trace: Trace) -> Iterator[Fault]:
@@ -44,6 +44,28 @@ def _out_of_turn(trace: Trace) -> Iterator[Fault]:
         messages = [("proposal", sent.issued_s), *(("decision", answer.t_s) for answer in answers_to(trace, sent))]
         if wrong := [(kind, t) for kind, t in messages if not ((t >= begins) & (t <= ends)).any()]:
             yield Fault(f"{wrong[0][0]} while nobody needs it", sent.ugv, wrong[0][1])
+
+
+def _answered_otherwise(trace: Trace) -> Iterator[Fault]:
+    """Decisions of which the UAV should have been told, or need not have been.
+
+    A UGV answers when it decides otherwise than before, or senses what neither its proposal's map nor its last answer
+    has. While an obstacle moves that the UAV does not see, it may answer all the time.
+    """
+    still = still_parts(trace)
+    unseen = any(barrier.moves and not barrier.known_to_uav for barrier in trace.scenario.barriers.values())
+    numbers = trace.decisions.sort_values("t_s", kind="stable").groupby("number")["answer"].apply(list).to_dict()
+    for sent in proposals_of(trace):
+        shown, before = are_same(still.cores, Cores.of(sent.mapped)).any(axis=1), None
+        told = np.zeros((2, len(shown)), dtype=np.bool_)
+        for answer, number in zip(answers_to(trace, sent), numbers.get(sent.number, []), strict=True):
+            away = np.where(are_there(trace, answer.t_s), beyond_range(trace, sent.ugv, answer.t_s), np.inf)
+            near = np.array([away <= -SENSED_M, away <= SENSED_M])  # surely, perhaps
+            new = near & ~shown & ~told[::-1]
+            due = before is None or (before.accepted, before.done) != (answer.accepted, answer.done)
+            if (due or new[0].any()) if number < 0 else not (due or unseen or new[1].any()):
+                yield Fault("answers out of turn", sent.ugv, answer.t_s, {"due": due, "number": number})
+            before, told = answer, near if number >= 0 else told
 
 
 def _wrong_maps(trace: Trace) -> Iterator[Fault]:

@@ -49,7 +49,7 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
     """Messages of the trace that are not those of its proposals and decisions, or not withdrawn when they should be."""
     table, ends = trace.messages, trace.t[-1] - TIME_TOLERANCE_S
     of = {kind: table[table["kind"] == kind] for kind in ("proposal", "withdrawal", "answer")}
-    if sorted(of["answer"]["number"]) != sorted(trace.decisions["answer"]):
+    if sorted(of["answer"]["number"]) != [*range((trace.decisions["answer"] >= 0).sum())]:
         yield Fault("answers are not those of the decisions")
     period_s, read = trace.scenario.intervention.period_s, of["answer"].dropna(subset="read_s")
     waited_s = (read["read_s"] - read["sent_s"]).to_numpy(dtype=np.float64)
@@ -66,7 +66,7 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
 
 
 def _misused(trace: Trace) -> Iterator[Fault]:
-    """Wrong senders and causes, joint plans not sent whole, decisions on what is over, replacements without a reason."""
+    """Wrong senders and causes, joint plans not sent whole, decisions on what is over, needless replacements."""
     every, scenario = proposals_of(trace), trace.scenario
     heard = trace.messages[trace.messages["kind"] == "answer"].dropna(subset="read_s")
     for uav, read_s in zip(heard["receiver"], heard["read_s"], strict=True):

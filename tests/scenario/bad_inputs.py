@@ -75,6 +75,8 @@ EDITS: list[tuple[str, object]] = [
     ("uav.max_speed_m_s", 250),
     ("ugvs.one.start_m", [5000, 0, 0]),
     ("uav.task", "../mine.py:Mine"),
+    ("ugv_controller", {"kind": "/home/me/mine.py:Mine"}),
+    ("ugv_controller", {"kind": "m:C", "parameters": {"gain": "high"}}),
     ("claims", {"MINE": "/home/me/mine.py:Mine"}),
     # names
     ("name", "a b"),

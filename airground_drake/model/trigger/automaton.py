@@ -82,6 +82,12 @@ def transitions_due(status: Array, t: float, spans: Array, levels: Array) -> npt
 
 
 @njit(cache=True)
+def are_numbers(spans: Array) -> bool:
+    """Whether no entry is NaN, which no comparison with a level would notice."""
+    return not np.isnan(spans).any()
+
+
+@njit(cache=True)
 def anything_due(status: Array, t: float, spans: Array, levels: Array) -> bool:
     """Whether a transition is due for any UGV, see `transitions_due`."""
     return bool(transitions_due(status, t, spans, levels).any())

@@ -28,7 +28,7 @@ from airground_drake.model.law.tasks import over_centroid
 from airground_drake.model.law.ugv_law import AcceptedMotion, Numbers, Tracking
 from airground_drake.model.plants.steering import HAND, along, heading_after, steer_all
 from airground_drake.model.trigger import automaton
-from airground_drake.model.trigger.automaton import FIELDS, INTERVENING, anything_due
+from airground_drake.model.trigger.automaton import FIELDS, INTERVENING, anything_due, are_numbers
 from airground_drake.model.trigger.excursion import Corners, gathered, ranges
 from airground_drake.sim.blocks.decision import MOST_SHORT, SHORTEST_S
 from airground_drake.uav.halts import watched
@@ -231,7 +231,7 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
         if mask & NOISE:
             drawn[:] = draws[counts[2]]
             counts[2] += 1
-        if np.isnan(span).any():  # discrete updates
+        if not are_numbers(span):  # discrete updates
             code = NOT_A_NUMBER
             break
         if mask & PLAN:

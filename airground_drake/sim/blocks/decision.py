@@ -25,7 +25,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, short
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
-from airground_drake.model.trigger.automaton import NEW, Trigger, advance, anything_due, begin
+from airground_drake.model.trigger.automaton import NEW, Trigger, advance, anything_due, are_numbers, begin
 from airground_drake.model.trigger.excursion import (
     Corners,
     bends,
@@ -269,7 +269,7 @@ class EventTrigger(LeafSystem):
         """The per-step update: make the transitions that became due in the step that ends, and begin another step."""
         t, spans = context.get_time(), self._range.Eval(context)
         before, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
-        if np.isnan(spans).any():  # no comparison with a level would notice it
+        if not are_numbers(spans):
             told = "from a decision block, a plant or a disturbance"
             raise PluginError(f"decision_range is not a number, {told}: {short(repr(spans.tolist()))}")
         if anything_due(before, t, spans, levels):
@@ -284,10 +284,12 @@ class EventTrigger(LeafSystem):
 
     def _count_short(self, lasted: float, discrete: DiscreteValues) -> None:
         """Count a step without a transition, which lasted so long, s, if it was short."""
-        short = discrete.value(3)[0] + 1.0 if lasted < self._short else 0.0
+        before = discrete.value(3)[0]
+        short = before + 1.0 if lasted < self._short else 0.0
         if short > MOST_SHORT:
             raise RuntimeError(
                 "an event cannot be isolated: coordinates are rounded too coarsely for so slow a motion; wanted: "
                 "coordinates nearer to the origin"
             )
-        discrete.set_value(3, [short])
+        if short != before:
+            discrete.set_value(3, [short])

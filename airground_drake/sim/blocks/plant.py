@@ -36,7 +36,7 @@ from airground_drake.model.plants.own import Own, OwnKeys
 from airground_drake.model.plants.plant import HEADING, Plant
 from airground_drake.model.plants.scripted import Scripted
 from airground_drake.scenario.load import validated
-from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.schema import OwnController, Scenario
 from airground_drake.sim.blocks.lifetime import weakly
 
 START_M = 1e-9  # a body may begin this far from its start, m: forward kinematics err by less
@@ -124,6 +124,14 @@ def steered_plant(body: Body, period_s: float) -> Diagram:
     return builder.Build()
 
 
+def name_of(make: Callable[..., Any]) -> str:
+    """What a scenario calls it: `module:Class`, also where it is a function, or its file is called my-robots.py."""
+    made_by = make if hasattr(make, "__qualname__") else type(make)
+    words = [*str(made_by.__module__).split("."), made_by.__qualname__]
+    *module, called = (re.sub(r"\W+|^(?=\d|$)", "_", word) for word in words)
+    return f"{'.'.join(module)}:{called}"
+
+
 class OwnPlant(NamedTuple):
     """A user's plant for one robot, made in Python; in a scenario file it is a class (`plant.kind`).
 
@@ -142,15 +150,14 @@ class OwnPlant(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What a scenario calls it: `module:Class`, also where it is a function, or its file is called my-robots.py."""
-        made_by = self.make if hasattr(self.make, "__qualname__") else type(self.make)
-        words = [*str(made_by.__module__).split("."), made_by.__qualname__]
-        *module, called = (re.sub(r"\W+|^(?=\d|$)", "_", word) for word in words)
-        return f"{'.'.join(module)}:{called}"
+        """What a scenario calls it, see `name_of`."""
+        return name_of(self.make)
 
 
-def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
-    """A valid scenario in which some robots have users' plants, by name."""
+def declared(
+    scenario: Scenario, plants: Mapping[str, OwnPlant], ugv_controller: Callable[..., System] | None = None
+) -> Scenario:
+    """A valid scenario in which some robots have users' plants, by name, and the UGVs a user's controller."""
     changed = copy.deepcopy(scenario)
     for robot, code in plants.items():
         if robot not in changed.robots:
@@ -163,11 +170,17 @@ def declared(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> Scenario:
             kind=code.name, drift_m_s=code.drift_m_s, cover_m=code.cover_m, parameters={**code.parameters}
         )  # fmt: skip
         changed.robots[robot].plant = [given]
+    if ugv_controller is not None:
+        other = isinstance(ugv_controller, type) and not issubclass(ugv_controller, System)
+        if other or not callable(ugv_controller):
+            told = short(repr(ugv_controller))
+            raise PluginError(f"ugv_controller is {told}; allowed: a subclass of Drake's System, or a function")
+        changed.ugv_controller = OwnController(kind=name_of(ugv_controller))
     return validated(changed)
 
 
 class OwnCode(NamedTuple):
-    """Where a user's plant comes from: its name in the scenario, and a function in its file."""
+    """Where a user's plant or controller comes from: its name in the scenario, and a function in its file."""
 
     name: str
     function: object
@@ -178,10 +191,14 @@ def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, Ow
     named = {robot: plant.kind for robot, given in scenario.robots.items() for plant in given.plant if plant.is_own}
     codes = {}
     for robot, name in named.items():
-        make = plants[robot].make if robot in plants else PLANTS.load(name, System)
-        functions = filter(isfunction, vars(make).values()) if isinstance(make, type) else ()
-        codes[robot] = OwnCode(name, next(iter(functions), make))
+        codes[robot] = code_of(name, plants[robot].make if robot in plants else PLANTS.load(name, System))
     return codes
+
+
+def code_of(name: str, make: Callable[..., System]) -> OwnCode:
+    """A name in the scenario, and a function in the file of what makes the System."""
+    functions = filter(isfunction, vars(make).values()) if isinstance(make, type) else ()
+    return OwnCode(name, next(iter(functions), make))
 
 
 GROUND_M = 1e-6  # by so much a UGV's plant may be off the ground, by rounding, m: walls have no end in height for UGVs

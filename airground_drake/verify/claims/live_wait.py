@@ -46,6 +46,7 @@ class LiveWait(TheoremClaim):
     )
 
     theorems: tuple[str, ...] = ("Patience.bounded",)
+    about_the_law = True
     margin_of = "longest intervention allowed"
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:

@@ -45,6 +45,7 @@ class SafeGate(SafeInv):
         "priorities and limits is for SAFE-HYP to compare, run by run."
     )
 
+    about_the_law = True
     theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always", "Passive.own_doing")
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:

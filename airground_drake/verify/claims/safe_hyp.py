@@ -125,7 +125,8 @@ class SafeHyp(TraceClaim):
         "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
         "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run. Beside an obstacle that "
         "may move the passive law held, and it moved no faster than declared: so d was kept in every period that "
-        "began at d + V h or more. The controllers were built with what the scenario says."
+        "began at d + V h or more. The controllers were built with what the scenario says; one of the user's own is "
+        "judged by its steps alone."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -195,6 +196,9 @@ class SafeHyp(TraceClaim):
         more: dict[str, Sequence[Any]] = {
             "beside_moving": beside_moving(trace), "least_shares": least_shares(trace), "own_plants": own_plants(trace)
         }  # fmt: skip
+        by_steps = {}
+        if own := trace.scenario.ugv_controller:
+            by_steps["own_controller"] = f"{own.kind} is judged by its steps, not by what it was built with"
         return Finding(
             "refuted" if first else "holds",
             margin=shown.get("margin"),
@@ -202,7 +206,9 @@ class SafeHyp(TraceClaim):
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
             where={key: shown[key] for key in shown if key not in ("margin", "unit")},
             counterexample=_against(trace, first, broken) if first else None,
-            evidence=asdict(evidence) | {key: [asdict(row) for row in rows] for key, rows in more.items() if rows},
+            evidence=asdict(evidence)
+            | {key: [asdict(row) for row in rows] for key, rows in more.items() if rows}
+            | by_steps,
             exercised=sum(binding.values()),
         )
 

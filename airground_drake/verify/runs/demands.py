@@ -82,6 +82,9 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
         }
         if len(moving):
             wanted[name]["moving_outlines"] = that_move
+    if own := scenario.ugv_controller:  # it is judged by its steps, whatever it was built with
+        sampling_s = wanted["ugv_controller"]["sampling_s"]
+        return wanted | {"ugv_controller": {"class": own.kind, "sampling_s": sampling_s}}
     of_run = scenario.runs[trace.run]
     wanted["ugv_controller"]["composition"] = of_run.composition
     if of_run.method != NO_INTERVENTION:

@@ -257,7 +257,9 @@ def without_decisions(trace: Trace) -> list[str]:
 
 
 class GateClaim(TraceClaim):
-    """A claim about the decisions of a gatekeeper."""
+    """A claim about the decisions of a gatekeeper, which predicts with the package's law."""
+
+    about_the_law = True
 
     def applies(self, trace: Trace) -> bool:
         """Methods (a) and (b) optimise nothing."""
