@@ -669,7 +669,9 @@ class Scenario:
     def key_of(self, name: str) -> str:
         """The key of a body in a scenario file; walls of the arena count as obstacles."""
         kind = self.kind_of(name)
-        return "uav" if kind == "uav" and not self.uavs else MAP if name == MAP else f"{kind}s.{name}"
+        if name == MAP and kind == "obstacle" and name not in self.obstacles:
+            return MAP
+        return "uav" if kind == "uav" and not self.uavs else f"{kind}s.{name}"
 
     @property
     def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:
