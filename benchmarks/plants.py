@@ -21,6 +21,7 @@ from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.model.plants.ackermann import Ackermann
 from airground_drake.model.plants.delay import Delay
 from airground_drake.model.plants.first_order import FirstOrder
 from airground_drake.model.plants.lag import Lag
@@ -46,6 +47,7 @@ PLANTS: dict[str, Plant] = {
     "unicycle, 0.35 m, never backwards": Unicycle(0.35, H, backwards=False),
     "unicycle, l = 0.1 m, 2 rad/s": Unicycle(0.1, H, max_turn_rad_s=2.0),
     "unicycle, l = 0.1 m, wheels": Unicycle(0.1, H, wheel_base_m=0.3, max_wheel_m_s=0.8),
+    "car, l = 0.35 m, R = 0.5 m": Ackermann(0.35, H, backwards=False, radius_m=0.5),
     "lag 0.1 s": Lag(0.1),
     "lag 0.3 s": Lag(0.3),
     "delay 0.15 s": Delay(3, H),
@@ -55,6 +57,7 @@ DRIVE = "{kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 2.0, wheel_base_m: 
 IN_DRAKE = {
     "unicycle": DRIVE,
     "unicycle that never drives backwards": DRIVE.replace("}", ", backwards: false}"),
+    "car": "{kind: ackermann, hand_point_m: 0.2, wheelbase_m: 0.3, max_steering_rad: 0.5}",
     "lag": "{kind: lag, time_constant_s: 0.2}",
     "delay and lag": "[{kind: delay, delay_s: 0.125}, {kind: lag, time_constant_s: 0.2}]",
 }

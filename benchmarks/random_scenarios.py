@@ -258,7 +258,7 @@ def _radii(number: int, count: int) -> list[float]:
 
 def _plants(number: int, count: int, h: float, speed: float) -> tuple[list[list[dict[str, Any]]], float]:
     """Plants of UGVs and of the UAV, in half of the scenarios; and what two of them take at most, m."""
-    rng = np.random.default_rng([20261127, number])
+    rng, cars = (np.random.default_rng([seed, number]) for seed in (20261127, 20261128))
     some, lag, late = bool(rng.random() < 0.5), float(rng.choice([0.05, 0.3])), h * float(rng.integers(1, 4))
     hand = 0.5 * speed * h * float(rng.choice([1.01, 3.0])) + float(rng.choice([0.0, 0.1]))
     kinds: list[list[dict[str, Any]]] = [
@@ -272,7 +272,11 @@ def _plants(number: int, count: int, h: float, speed: float) -> tuple[list[list[
         limits |= {"wheel_base_m": 0.3, "max_wheel_speed_m_s": 1.2 * speed}
     found = []
     for _ in range(count):
-        drive = {"kind": "unicycle", "hand_point_m": hand, "heading_rad": float(rng.uniform(-4.0, 4.0)), **limits}
+        turned = {"hand_point_m": hand, "heading_rad": float(rng.uniform(-4.0, 4.0))}
+        drive = {"kind": "unicycle", **turned, **limits}
+        if cars.random() < 0.3:
+            steers = {"wheelbase_m": 0.2, "max_steering_rad": float(cars.uniform(0.2, 1.4))}
+            drive = {"kind": "ackermann", **turned, **steers}
         found.append([*kinds, [drive], [drive]][rng.integers(6)] if some else kinds[0])
     found.append(kinds[rng.integers(4)] if some else kinds[0])
     return found, some * 2.0 * max(1.2 * hand, 2.0 * speed * (lag + late))

@@ -16,7 +16,7 @@ from airground_drake.report.stalls import stalls
 from airground_drake.scenario.schema import MAP
 from airground_drake.sim.collisions import first_collisions
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S, moved_at_the_end
+from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S, Way, moved_at_the_end
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.pair_kinds import MOVING, kind_of
 from airground_drake.verify.runs.gate_record import without_decisions
@@ -131,7 +131,7 @@ def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
 def _on_the_way(trace: Trace, ugv: str) -> dict[str, Any]:
     begin_s, end_s = max(trace.t[-1] - AT_REST_S, trace.t[0]), trace.t[-1]
     before_m, left_m = (_way_left_m(trace, ugv, time_s) for time_s in (begin_s, end_s))
-    moved_m = moved_at_the_end(trace, ugv)
+    moved_m = moved_at_the_end(Way(trace.t, trace.position(ugv)))
     stands = moved_m <= AT_REST_M
     speed_m_s = (before_m - left_m) / (end_s - begin_s)
     creeps = not stands and moved_m < CREEPING * trace.scenario.ugvs[ugv].preset.speed_m_s * (end_s - begin_s)

@@ -131,7 +131,11 @@ class Chosen(NamedTuple):
 def _choices(document: Document) -> list[Chosen]:
     listed = document.data.get("choices") if isinstance(document.data, dict) else None
     entries = [entry for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
-    return [Chosen(entry, dict(entry), deepcopy(way(document.data, str(entry.get("key"))))) for entry in entries]
+    ways = [way(document.data, str(entry.get("key"))) for entry in entries]
+    return [
+        Chosen(entry, dict(entry), [*passed[:-1], *deepcopy(passed[-1:])])
+        for entry, passed in zip(entries, ways, strict=True)
+    ]
 
 
 def _mark_set(document: Document, before: Sequence[Chosen]) -> None:

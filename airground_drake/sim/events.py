@@ -5,6 +5,7 @@ A UGV that has executed a proposal for as long as it was accepted is on its own 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -60,11 +61,18 @@ def extract(trace: Trace) -> list[dict[str, Any]]:
 def _add_arrival(trace: Trace, robot: str, rows: int, add: Any) -> None:
     """Add the time after which the robot stays within the arrival tolerance of its target during the first rows."""
     scenario = trace.scenario
-    away = np.linalg.norm(trace.position(robot)[:rows] - np.array(scenario.robots[robot].target_m), axis=1)
-    outside = np.flatnonzero(away > scenario.arrival_tolerance_m)
-    first = int(outside[-1]) + 1 if len(outside) else 0
-    if first < len(away):
+    target, tolerance_m = scenario.robots[robot].target_m, scenario.arrival_tolerance_m
+    first = arrival_row(trace.position(robot)[:rows], target, tolerance_m)
+    if first is not None:
         add(trace.t[first], robot, "arrival")
+
+
+def arrival_row(position: Array, target: Sequence[float], tolerance_m: float) -> int | None:
+    """The row (of T) from which on a robot, at (T, 3), m, stays that near to its target; None if there is none."""
+    away = np.linalg.norm(position - np.array(target), axis=1)
+    outside = np.flatnonzero(away > tolerance_m)
+    first = int(outside[-1]) + 1 if len(outside) else 0
+    return first if first < len(away) else None
 
 
 def _add_collisions(trace: Trace, add: Any) -> None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any, Literal, get_args
 
@@ -22,7 +23,7 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance, Composition
 from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.model.plants.first_order import FirstOrder
-from airground_drake.scenario.load import own, validated
+from airground_drake.scenario.load import own
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.sim.blocks.decision import ACCURACY, DecisionVariable
@@ -255,7 +256,7 @@ def simulate(
             (`plant.kind`).
         ugv_controller: makes a controller of your own for all UGVs, as if the scenario named it; see `build_diagram`.
         engine: 'drake' is Drake's Simulator; 'batch' makes the same trace, bit by bit, in a compiled loop, several
-            times faster. What the loop cannot make (see docs/campaigns.md) Drake makes.
+            times faster. What the loop cannot make (see docs/commands.md) Drake makes, and a line on stderr says why.
 
     Raises:
         ScenarioError: if the scenario, or the seed, is not valid.
@@ -266,14 +267,16 @@ def simulate(
     """
     if engine not in ENGINES:
         raise UnknownNameError("engine", engine, ENGINES)
-    if seed is not None:
-        scenario = validated(scenario, {"seed": seed})
-    valid = declared(scenario, plants, ugv_controller)
-    if engine == "batch" and run in valid.runs and decision_block is DecisionVariable and not (observers or speed):
-        with suppress(LeftToDrakeError):
+    valid = declared(scenario, plants, ugv_controller, seed)
+    if engine == "batch" and run in valid.runs:
+        try:
+            if decision_block is not DecisionVariable or observers or speed:
+                raise LeftToDrakeError("a decision block of your own, observers or a speed")
             trace = Batch(valid, run).simulate()
             if watch is not None:
                 watch(valid.duration_s)
             return trace
+        except LeftToDrakeError as error:
+            print(f"note: Drake's Simulator makes run {run}: the loop leaves it {error}", file=sys.stderr)
     recorder = Recorder(valid, run, decision_block, observers, plants=plants, ugv_controller=ugv_controller)
     return recorder.simulate(watch=watch, speed=speed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import threading
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +11,7 @@ from pydrake.solvers import MathematicalProgram
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.compiling import njit
+from airground_drake.ugv.daqp_solver import Form
 from airground_drake.ugv.problem import Evaluation, Problem
 from airground_drake.ugv.relaxation import offsets, within_reach
 
@@ -36,28 +36,20 @@ class BinaryProgram:
     def __init__(self, stages: int, blocks: int) -> None:
         """A program without any problem's data, for N stages and B <= N accept variables, one per block of stages."""
         n, b = stages, blocks
-        self.program = MathematicalProgram()  # (26); with shares in place of binary values it is (27)
+        self.program, self.count = MathematicalProgram(), b  # (26); with shares in place of binary values it is (27)
         self.block = block_of_stage(n, b)  # of each stage, (N,)
-        # Binary variables (24), (26c), (B,): 1 accepts. Slack (26e), (N,), m.
-        self.omega: Any = self.program.NewBinaryVariables(b, "omega")
-        self.u: Any = self.program.NewContinuousVariables(n, "u")
-        # (25): costs of task errors and of slack
-        self.error = self.program.AddQuadraticCost(np.zeros((b, b)), np.zeros(b), self.omega, is_convex=True)
-        self.slack = self.program.AddQuadraticCost(np.zeros((n, n)), np.zeros(n), self.u, is_convex=True)
-        # (26d), one row per half-plane that can bind, over (omega, u), and which half-planes these are, (N, m)
-        self.half_planes = self.program.AddLinearConstraint(
-            np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), np.concatenate([self.omega, self.u])
-        )
-        self.within = np.zeros((n, 0), dtype=bool)
-        # (26c): 1 is allowed only where the choice moves the UGV, so that no solver need try both.
-        self.choices = self.program.AddBoundingBoxConstraint(0.0, 1.0, self.omega)
-        self.program.AddBoundingBoxConstraint(0.0, np.inf, self.u)  # (26e)
-        self._live = np.ones(b, dtype=bool)
         self._of_block = np.equal.outer(self.block, np.arange(b)).astype(np.float64)
+        # Binary variables (24), (26c), (B,): 1 accepts. Then slack (26e), (N,), m.
+        x = np.append(self.program.NewBinaryVariables(b, "omega"), self.program.NewContinuousVariables(n, "u"))
+        cost = self.program.AddQuadraticCost(np.zeros((b + n, b + n)), np.zeros(b + n), x, is_convex=True)  # (25)
+        # (26d): one row per half-plane that can bind, or an empty one
+        rows = self.program.AddLinearConstraint(np.zeros((1, b + n)), np.full(1, -np.inf), np.full(1, np.inf), x)
+        choices = self.program.AddBoundingBoxConstraint(np.zeros(b + n), np.full(b + n, np.inf), x)  # (26c), (26e)
+        self._cost, self._rows, self._choices = cost.evaluator(), rows.evaluator(), choices.evaluator()
 
     def update(self, problem: Problem, normals: Array) -> None:
         """Put in the data of a problem of this size, with half-planes along unit normals (N, m, 3)."""
-        n = problem.stages
+        self.problem, self.normals, n, b = problem, normals, problem.stages, self.count
         steps = (problem.dt * (problem.accept - problem.refuse))[:, :AXES]
         refused = problem.positions(np.zeros(n))
         away = (refused - problem.reference)[:, :AXES]
@@ -65,41 +57,47 @@ class BinaryProgram:
         # a stage's choice moves all later ends: column j of d rho_k / d omega_j is steps[j] for k >= j
         remaining = np.cumsum(weights[::-1])[::-1]
         later = np.maximum.outer(np.arange(n), np.arange(n))
-        hessian = self._of_block.T @ (steps @ steps.T * remaining[later]) @ self._of_block
+        hessian = np.diag(np.full(b + n, 2.0 * problem.dt * problem.slack_weight))
+        hessian[:b, :b] = self._of_block.T @ (steps @ steps.T * remaining[later]) @ self._of_block
         force = np.cumsum((weights[:, None] * away)[::-1], axis=0)[::-1]
-        gradient = self._of_block.T @ (steps * force).sum(axis=1)
+        gradient = np.append(self._of_block.T @ (steps * force).sum(axis=1), np.zeros(n))
         height = refused[:, 2] - problem.reference[:, 2]  # no choice changes it
         constant = 0.5 * float(weights @ (np.square(away).sum(axis=1) + np.square(height)))
-        self._live = hessian.diagonal() > _IDLE**2 * hessian.diagonal().max()
-        self.choices.evaluator().UpdateUpperBound(self._live.astype(np.float64))
-        self.error.evaluator().UpdateCoefficients(hessian, gradient, constant, is_convex=True)
-        of_slack = np.full(n, 2.0 * problem.dt * problem.slack_weight)
-        self.slack.evaluator().UpdateCoefficients(np.diag(of_slack), np.zeros(n), is_convex=True)
+        self._cost.UpdateCoefficients(hessian, gradient, constant, is_convex=True)
+        # 1 is allowed only where the choice moves the UGV, so that no solver need try both
+        self._live = hessian.diagonal()[:b] > _IDLE**2 * hessian.diagonal()[:b].max()
+        self._choices.UpdateUpperBound(np.append(self._live, np.full(n, np.inf)))
+        # which half-planes are rows, (N, m)
         self.within = within_reach(problem) & (problem.slack_weight > 0.0)
-        rows, lower = self._rows(problem, normals, steps, refused - problem.reference)
-        self.half_planes.evaluator().UpdateCoefficients(rows, lower, np.full(len(lower), np.inf))
+        rows, lower = self._half_planes(steps, refused - problem.reference)
+        self._rows.UpdateCoefficients(rows, lower, np.full(len(lower), np.inf))
+        # the program as DAQP takes it: all costs and constraints are on all variables, in their order
+        self.form = Form(
+            self._cost.c(), self._cost.Q(), self._cost.b(), self._rows.GetDenseA(), self._rows.lower_bound(),
+            self._rows.upper_bound(), self._choices.lower_bound(), self._choices.upper_bound(), np.arange(b + n) < b,
+        )  # fmt: skip
 
-    def _rows(self, problem: Problem, normals: Array, steps: Array, away: Array) -> tuple[Array, Array]:
-        """Coefficients (rows, B + N) and lower bounds of the half-planes along normals (N, m, 3)."""
-        # Without half-planes: one empty row. `steps` is what accepting at a stage adds to the position, (N, 2), m, and
-        # `away` are the task errors of refusing throughout, (N, 3), m.
-        n = problem.stages
+    def _half_planes(self, steps: Array, away: Array) -> tuple[Array, Array]:
+        """Coefficients (rows, B + N) and lower bounds of the half-planes that can bind."""
+        # `steps` is what accepting at a stage adds to the position, (N, 2), m, and `away` are the task errors of
+        # refusing throughout, (N, 3), m.
+        n = self.problem.stages
         stage, point = map(np.ascontiguousarray, np.nonzero(self.within))  # the layout that is compiled for
-        normal = normals[stage, point]
+        normal = self.normals[stage, point]
         before = np.arange(n) <= stage[:, None]
         of_omega = (normal[:, :AXES] @ steps.T * before) @ self._of_block
-        lower = offsets(problem, normals)[stage, point] - (normal[:, :AXES] * away[stage, :AXES]).sum(axis=1)
+        lower = offsets(self.problem, self.normals)[stage, point] - (normal[:, :AXES] * away[stage, :AXES]).sum(axis=1)
         binding = _may_bind(stage, of_omega, lower)
         self.within[stage[~binding], point[~binding]] = False
         if not binding.any():
-            return np.zeros((1, self._of_block.shape[1] + n)), np.full(1, -np.inf)
+            return np.zeros((1, self.count + n)), np.full(1, -np.inf)
         of_u = np.equal.outer(stage[binding], np.arange(n)).astype(np.float64)
         return np.hstack([of_omega[binding], of_u]), lower[binding]
 
-    def guess(self, problem: Problem, plan: Evaluation, normals: Array) -> Array:
+    def guess(self, plan: Evaluation) -> Array:
         """Values of the program's variables for a plan: a solution that satisfies all constraints, (B + N,)."""
-        away = plan.positions[:, None] - problem.centres
-        lacking = problem.distances - np.einsum("kmi,kmi->km", normals, away)
+        away = plan.positions[:, None] - self.problem.centres
+        lacking = self.problem.distances - np.einsum("kmi,kmi->km", self.normals, away)
         slack = np.where(self.within, lacking, 0.0).max(axis=1, initial=0.0)
         return np.concatenate([np.where(self._live, self.blocked(plan.omega), 0.0), slack])
 

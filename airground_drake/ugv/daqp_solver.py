@@ -10,9 +10,9 @@ says whether it is infeasible or unbounded, or whether a limit stopped the searc
 
 from __future__ import annotations
 
-import functools
 import math
-import threading
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import daqp
@@ -32,6 +32,9 @@ from pydrake.symbolic import Expression, Variable
 
 from airground_drake.base.arrays import Array
 
+Flags = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.intp]
+
 # What a program may have. Visualization callbacks are not called.
 SUPPORTED = frozenset({
     ProgramAttribute.kLinearCost, ProgramAttribute.kQuadraticCost, ProgramAttribute.kLinearConstraint,
@@ -43,7 +46,7 @@ FOUND, INFEASIBLE, UNBOUNDED, STOPPED, INVALID, FAILED = (
 )  # fmt: skip
 # What DAQP's flags mean; 4: solved, inexactly; 5: stopped with a solution, -7: without one. Others are failures.
 _ENDED = {1: FOUND, 2: FOUND, 4: FOUND, 5: STOPPED, -4: STOPPED, -7: STOPPED, -1: INFEASIBLE, -3: UNBOUNDED}
-_BINARY, _NO_BOUND = 16, 1e30
+_SOFT, _BINARY, _NO_BOUND = 8, 16, 1e30
 _FLAT = 1e-24  # a variable counts as linear if its curvature is below this share of the largest
 # Curvature that binary variables get, in units of the largest, and weight of DAQP's proximal point method. A negative
 # weight counts only where the Hessian is singular. Where DAQP fails, the next is tried. More curvature makes a search
@@ -60,7 +63,7 @@ class SolverLimits(NamedTuple):
     """Options of a solution; the first two are DAQP's own.
 
     Attributes:
-        time_limit: s; DAQP looks at the clock every 32 nodes. 0: none.
+        time_limit: s; DAQP looks at the clock every 32 nodes. 0 or infinite: none.
         iter_limit: iterations of the active-set method, at each node.
         relaxed: 1: binary variables may have any value in [0, 1].
     """
@@ -85,44 +88,20 @@ class Details(NamedTuple):
     multipliers: Array = np.zeros(0)
 
 
-class _Layout:
-    """What stays while only coefficients of a program change."""
+class Optimum(NamedTuple):
+    """How a search ended, x (n,), NaN without a solution, and details."""
 
-    # It includes a program without constraints by which CLP fills results: Python cannot set their variables, nor their
-    # cost. CLP takes no binary variables, so continuous ones stand in for them.
-
-    def __init__(self, program: MathematicalProgram) -> None:
-        self.index: dict[int, int] = program.decision_variable_index()
-        variables = program.decision_variables()
-        self.binary = np.array([x.get_type() == Variable.Type.BINARY for x in variables], dtype=bool)
-        self.places = functools.lru_cache(256)(self._places)
-        self._shell, self._clp = MathematicalProgram(), ClpSolver()
-        stand_ins = [Variable(x.get_name()) if binary else x for x, binary in zip(variables, self.binary, strict=True)]
-        self._shell.AddDecisionVariables(np.array(stand_ins, dtype=object))
-        self._cost = self._shell.AddLinearCost(np.zeros(len(variables)), self._shell.decision_variables())
-
-    def fits(self, program: MathematicalProgram) -> bool:
-        """Whether the program has these variables in this order; a variable never changes its type."""
-        return bool(self.index == program.decision_variable_index())
-
-    def _places(self, binding: Any) -> Any:
-        """Indices of the variables of a cost or constraint, in its order; a slice, which is quicker, if possible."""
-        indices = np.array([self.index[x.get_id()] for x in binding.variables()], dtype=np.intp)
-        follow = len(indices) and (np.diff(indices) == 1).all()
-        return slice(int(indices[0]), int(indices[-1]) + 1) if follow else indices
-
-    def fill(self, result: MathematicalProgramResult, ended: SolutionResult, x: Array, cost: float) -> None:
-        """Put a solution into a result of Drake."""
-        self._cost.evaluator().UpdateCoefficients(np.zeros(len(x)), cost)
-        self._clp.Solve(self._shell, None, None, result)
-        result.set_x_val(x)
-        result.set_solution_result(ended)
+    ended: SolutionResult
+    x: Array
+    details: Details = Details()
 
 
-class _Form(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Form:
     """min x' H x / 2 + f' x + constant  so that  lower <= A x <= upper,  least <= x <= most,  x[binary] in {0, 1}."""
 
-    # H is (n, n), f, least, most and binary are (n,), A is (m, n), lower and upper are (m,); inf: no bound.
+    # H is (n, n), f, least, most and binary are (n,), A is (m, n), lower and upper are (m,); inf: no bound. Sums are by
+    # `einsum`: BLAS would start threads, which cost more than such sizes.
 
     constant: float
     hessian: Array
@@ -132,151 +111,183 @@ class _Form(NamedTuple):
     upper: Array
     least: Array
     most: Array
-    binary: npt.NDArray[np.bool_]
+    binary: Flags
 
     @classmethod
-    def of(cls, program: MathematicalProgram, layout: _Layout) -> _Form:
+    def of(cls, program: MathematicalProgram) -> Form:
         """Read the evaluators; pydrake has no bindings for `AggregateQuadraticCosts` and the like."""
-        n = program.num_vars()
+
+        def places(binding: Any) -> Indices:
+            return np.array(program.FindDecisionVariableIndices(binding.variables()), dtype=np.intp)
+
+        n, kinds = program.num_vars(), [x.get_type() for x in program.decision_variables()]
         constant, hessian, gradient = 0.0, np.zeros((n, n)), np.zeros(n)
         for binding in program.quadratic_costs():
-            i, cost = layout.places(binding), binding.evaluator()
-            _add(hessian, (i, i) if isinstance(i, slice) else (i[:, None], i), cost.Q())
-            _add(gradient, (i,), cost.b())
+            i, cost = places(binding), binding.evaluator()
+            np.add.at(hessian, (i[:, None], i), cost.Q())
+            np.add.at(gradient, i, cost.b())
             constant += cost.c()
         for binding in program.linear_costs():
-            _add(gradient, (layout.places(binding),), binding.evaluator().a())
+            np.add.at(gradient, places(binding), binding.evaluator().a())
             constant += binding.evaluator().b()
         rows, lower, upper = [np.zeros((0, n))], [np.zeros(0)], [np.zeros(0)]
         for binding in (*program.linear_constraints(), *program.linear_equality_constraints()):
             constraint = binding.evaluator()
             rows.append(np.zeros((constraint.num_constraints(), n)))
-            _add(rows[-1], (slice(None), layout.places(binding)), constraint.GetDenseA())
+            np.add.at(rows[-1].T, places(binding), constraint.GetDenseA().T)
             lower.append(constraint.lower_bound())
             upper.append(constraint.upper_bound())
-        least = np.where(layout.binary, 0.0, -np.inf)
-        most = np.where(layout.binary, 1.0, np.inf)
+        binary = np.array([kind == Variable.Type.BINARY for kind in kinds], dtype=bool)
+        least, most = np.where(binary, 0.0, -np.inf), np.where(binary, 1.0, np.inf)
         for binding in program.bounding_box_constraints():
-            np.maximum.at(least, layout.places(binding), binding.evaluator().lower_bound())
-            np.minimum.at(most, layout.places(binding), binding.evaluator().upper_bound())
-        least = np.where(layout.binary, np.ceil(least), least)
-        most = np.where(layout.binary, np.floor(most), most)
+            np.maximum.at(least, places(binding), binding.evaluator().lower_bound())
+            np.minimum.at(most, places(binding), binding.evaluator().upper_bound())
+        least, most = np.where(binary, np.ceil(least), least), np.where(binary, np.floor(most), most)
         bounds = np.concatenate(lower), np.concatenate(upper), least, most
-        return cls(constant, hessian, gradient, np.concatenate(rows), *bounds, layout.binary)
+        return cls(constant, hessian, gradient, np.concatenate(rows), *bounds, binary)
 
+    @cached_property
     def fault(self) -> SolutionResult | None:
         """INVALID or INFEASIBLE, if that shows at sight."""
         bounds = np.concatenate([self.lower, self.upper, self.least, self.most])
-        if np.isnan(bounds).any() or not all(np.isfinite(coefficients).all() for coefficients in self[:4]):
+        coefficients = self.constant, self.hessian, self.gradient, self.rows
+        if np.isnan(bounds).any() or not all(np.isfinite(values).all() for values in coefficients):
             return INVALID
         crossed = (self.least > self.most).any() or (self.lower > self.upper).any()
         empty = ~self.rows.any(axis=1)
         return INFEASIBLE if crossed or ((self.lower > 0.0) | (self.upper < 0.0))[empty].any() else None
 
-    def cost(self, x: Array) -> float:
-        """The cost at x, (n,). By `einsum`, as all here: BLAS would start threads, which cost more than such sizes."""
-        return self.constant + float((self.gradient + 0.5 * np.einsum("ij,j->i", self.hessian, x)) @ x)
-
-    def is_met(self, x: Array) -> bool:
-        """Whether x, (n,), satisfies all constraints, and binary variables are binary."""
-        at, off = np.einsum("ij,j->i", self.rows, x), np.abs(x - x.round())[self.binary]
-        sides = (self.lower - at, at - self.upper, self.least - x, x - self.most, off)
-        return bool(np.isfinite(x).all() and np.concatenate(sides).max(initial=0.0) <= _FEASIBLE)
-
-    def relaxed(self) -> _Form:
-        """With shares in [0, 1] for the binary variables."""
-        return self._replace(binary=np.zeros_like(self.binary))
-
-    def without_cost(self) -> _Form:
-        """The same constraints, with the squared distance from 0 for a cost."""
-        n = len(self.gradient)
-        return self._replace(constant=0.0, hessian=np.eye(n), gradient=np.zeros(n))
-
-    def own(self) -> npt.NDArray[np.bool_]:
+    @cached_property
+    def own(self) -> Flags:
         """Variables with a quadratic cost that involves no other variable, (n,)."""
         return np.asarray(((self.hessian != 0.0).sum(axis=0) == 1) & (self.hessian.diagonal() > 0.0))
 
-    def may_recede(self) -> bool:
-        """Whether, besides binary variables, there are directions without curvature: the cost may fall for ever."""
-        return bool(self.binary.any() and not self.own()[~self.binary].all())
+    @cached_property
+    def scaled(self) -> _Scaled:
+        """What DAQP sees of it."""
+        return _Scaled(self)
 
-    def solve(self, limits: SolverLimits, known: float = math.inf) -> tuple[SolutionResult, Array, Details]:
-        """How it ended, x (n,), NaN without a solution, and details; what costs more than `known` is not looked for."""
-        # A variable with a quadratic cost of its own that is in no row needs no solver: DAQP would be slower with it.
-        free = self.own() & ~self.binary & ~self.rows.any(axis=0)
-        x, k = np.zeros(len(free)), np.flatnonzero(~free)
-        x[free] = np.clip(-self.gradient[free] / self.hessian.diagonal()[free], self.least[free], self.most[free])
-        rest = self._replace(
-            constant=self.cost(x), hessian=self.hessian[np.ix_(k, k)], gradient=self.gradient[k], rows=self.rows[:, k],
-            least=self.least[k], most=self.most[k], binary=self.binary[k],
-        )  # fmt: skip
-        ended, x[k], details = rest._by_daqp(limits, known)
-        return ended, x if np.isfinite(x).all() else np.full(len(x), np.nan), details
+    def cost(self, x: Array) -> float:
+        """The cost at x, (n,)."""
+        return self.constant + float((self.gradient + 0.5 * np.einsum("ij,j->i", self.hessian, x)) @ x)
 
-    def _by_daqp(self, limits: SolverLimits, known: float) -> tuple[SolutionResult, Array, Details]:
-        # Variables are scaled to a unit diagonal of the Hessian. Where it is singular, DAQP approaches the solution by
-        # proximal points. Where it fails, each binary variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and 1.
-        n, multipliers = len(self.gradient), np.zeros(len(self.rows))
-        if n == 0:
-            return FOUND, np.zeros(0), Details(multipliers=multipliers)
-        diagonal = self.hessian.diagonal()
-        largest = diagonal.max() or np.abs(self.gradient).max() or 1.0
-        scale = np.sqrt(np.where(diagonal > _FLAT * largest, diagonal / largest, 1.0))
-        hessian = self.hessian / (scale[:, None] * scale) / largest
-        gradient = self.gradient / scale / largest
-        rows = np.flatnonzero((np.isfinite(self.lower) | np.isfinite(self.upper)) & self.rows.any(axis=1))
-        upper = np.concatenate([self.most * scale, self.upper[rows]]).clip(-_NO_BOUND, _NO_BOUND)
-        lower = np.concatenate([self.least * scale, self.lower[rows]]).clip(-_NO_BOUND, _NO_BOUND)
-        sense = np.zeros(len(upper), dtype=np.intc)
-        sense[:n][self.binary] = _BINARY
-        x, info = np.full(n, np.nan), dict[str, Any]()
-        for curvature, proximal in _APPROACHES if self.binary.any() else _APPROACH:
-            added = np.where(self.binary, curvature, 0.0)
+    def is_met(self, x: Array, *, relaxed: bool) -> bool:
+        """Whether x, (n,), satisfies all constraints, and binary variables are binary, or `relaxed`."""
+        if not np.isfinite(x).all():
+            return False
+        at, off = np.einsum("ij,j->i", self.rows, x), np.abs(x - x.round())[self.binary & (not relaxed)]
+        sides = (self.lower - at, at - self.upper, self.least - x, x - self.most, off)
+        return bool(np.concatenate(sides).max(initial=0.0) <= _FEASIBLE)
+
+    def is_feasible(self, limits: SolverLimits) -> SolutionResult:
+        """FOUND if DAQP finds any x: the nearest to 0."""
+        n = len(self.gradient)
+        return replace(self, constant=0.0, hessian=np.eye(n), gradient=np.zeros(n)).scaled.solve(limits).ended
+
+    def minimise(self, guess: Array | None, limits: SolverLimits) -> Optimum:
+        """The optimum, checked: a solver may be wrong. `guess` (n,): where to start; None or not finite: nowhere."""
+        nowhere, relaxed = np.full(len(self.gradient), np.nan), bool(limits.relaxed)
+        if self.fault is not None:
+            return Optimum(self.fault, nowhere)
+        # besides binary variables there are directions without curvature: the cost may fall for ever
+        recedes = not relaxed and self.binary.any() and not self.own[~self.binary].all()
+        if recedes and self.scaled.solve(limits._replace(relaxed=1)).ended == UNBOUNDED:
+            feasible = self.is_feasible(limits)
+            return Optimum(UNBOUNDED if feasible == FOUND else feasible, nowhere)
+        start = guess if guess is not None and self.is_met(guess, relaxed=relaxed) else None
+        cost = math.inf if start is None else self.cost(start)
+        optimum = self.scaled.solve(limits, cost + _AGAIN * abs(cost))
+        if optimum.ended == STOPPED and start is not None and not self.cost(optimum.x) < cost:
+            return optimum._replace(x=start)
+        wrong = optimum.ended == FOUND and not self.is_met(optimum.x, relaxed=relaxed)
+        if optimum.ended == INFEASIBLE:
+            wrong = start is not None or self.is_feasible(limits) == FOUND
+        return optimum._replace(ended=FAILED) if wrong else optimum
+
+
+class _Scaled:
+    """What DAQP sees of a `Form`: variables scaled to a unit diagonal of the Hessian, and only those it need see."""
+
+    def __init__(self, form: Form) -> None:
+        self.form, diagonal, used = form, form.hessian.diagonal(), form.rows != 0.0
+        # A variable with a quadratic cost of its own that is in no row gets its best value here; with slack, which is
+        # in one row and only helps to meet it, its row is a soft one. DAQP would be slower with them.
+        self.base = np.zeros(len(diagonal))
+        free = form.own & ~form.binary & ~used.any(axis=0)
+        self.base[free] = np.clip(-form.gradient[free] / diagonal[free], form.least[free], form.most[free])
+        self.rows = np.flatnonzero((np.isfinite(form.lower) | np.isfinite(form.upper)) & used.any(axis=1))
+        self.slack = self._slack(used)[self.rows]  # variable of each row, or -1
+        seen = ~free
+        seen[self.slack[self.slack >= 0]] = False
+        k = self.kept = np.flatnonzero(seen)
+        self.largest = diagonal[k].max(initial=0.0) or np.abs(form.gradient[k]).max(initial=0.0) or 1.0
+        self.scale = np.sqrt(np.where(diagonal[k] > _FLAT * self.largest, diagonal[k] / self.largest, 1.0))
+        self.hessian = form.hessian[np.ix_(k, k)] / (self.scale[:, None] * self.scale) / self.largest
+        self.gradient = form.gradient[k] / self.scale / self.largest
+        self.matrix = form.rows[np.ix_(self.rows, k)] / self.scale
+        self.lower = np.append(form.least[k] * self.scale, form.lower[self.rows]).clip(-_NO_BOUND, _NO_BOUND)
+        self.upper = np.append(form.most[k] * self.scale, form.upper[self.rows]).clip(-_NO_BOUND, _NO_BOUND)
+
+    def _slack(self, used: Flags) -> Indices:
+        form = self.form
+        bounds = (form.gradient == 0.0) & (form.least == 0.0) & (form.most == np.inf)
+        j = np.flatnonzero(form.own & ~form.binary & bounds & (used.sum(axis=0) == 1))
+        row, slack = np.nonzero(used[:, j].T)[1], np.full(len(used), -1)
+        helps = (form.rows[row, j] > 0.0) & (form.upper[row] == np.inf)
+        slack[row[helps]] = j[helps]
+        return slack
+
+    def solve(self, limits: SolverLimits, known: float = math.inf) -> Optimum:
+        """The optimum, unless it costs more than `known`."""
+        # Where the Hessian is singular, DAQP approaches the solution by proximal points. Where it fails, each binary
+        # variable x gets the cost c (x^2 - x) / 2, which is 0 at 0 and 1.
+        form, k, x, multipliers = self.form, len(self.kept), self.base.copy(), np.zeros(len(self.form.rows))
+        if k == 0:
+            return Optimum(FOUND, x, Details(multipliers=multipliers))
+        binary, soft = form.binary[self.kept] & (not limits.relaxed), self.slack >= 0
+        rows, j = self.rows[soft], self.slack[soft]
+        entering, softness = form.rows[rows, j], np.ones(len(self.lower))
+        softness[k:][soft] = self.largest * entering**2 / form.hessian[j, j]  # reciprocal weights
+        sense = np.append(np.where(binary, _BINARY, 0), np.where(soft, _SOFT, 0)).astype(np.intc)
+        info = dict[str, Any]()
+        for curvature, proximal in _APPROACHES if binary.any() else _APPROACH:
             model = daqp.Model()
             model.settings = {
                 "presolve": 0, "primal_tol": _TIGHT, "iter_limit": int(limits.iter_limit), "eps_prox": proximal,
-                "fval_bound": min((known - self.constant) / largest, _NO_BOUND),
+                "fval_bound": min((known - form.cost(self.base)) / self.largest, _NO_BOUND),
                 "time_limit": max(limits.time_limit, 1e-6) if 0.0 < limits.time_limit < math.inf else 0.0,
             }  # fmt: skip
-            linear = gradient - 0.5 * added * scale
-            flag, _ = model.setup(hessian + np.diag(added), linear, self.rows[rows] / scale, upper, lower, sense)
+            added = np.where(binary, curvature, 0.0)
+            hessian = self.hessian + np.diag(added) if curvature else self.hessian
+            gradient = self.gradient - 0.5 * added * self.scale
+            flag, _ = model.setup(hessian, gradient, self.matrix, self.upper, self.lower, sense)
             if flag >= 0:
+                model.soft_weights(rho_l=softness, rho_u=softness)
                 scaled, _, flag, info = model.solve()
             if flag in _ENDED:
                 break
         if flag > 0:
-            x = scaled / scale
-            x[self.binary] = x[self.binary].round()
-            x = np.clip(x, self.least, self.most)
-            multipliers[rows] = -largest * info["lam"][n:]
-        return _ENDED.get(flag, FAILED), x, Details(info.get("iterations", 0), info.get("nodes", 0), multipliers)
+            x[self.kept] = scaled / self.scale
+            if not limits.relaxed:
+                x[form.binary] = x[form.binary].round()
+            x = np.clip(x, form.least, form.most)
+            x[j] = np.maximum(0.0, form.lower[rows] - np.einsum("ij,j->i", form.rows[rows], x)) / entering
+            multipliers[self.rows] = -self.largest * info["lam"][k:]
+        details = Details(info.get("iterations", 0), info.get("nodes", 0), multipliers)
+        return Optimum(_ENDED.get(flag, FAILED), x if flag > 0 else np.full(len(x), np.nan), details)
 
 
-def _add(total: Array, where: Any, values: Array) -> None:
-    """Add values at indices; indices, but not slices, may repeat."""
-    if all(isinstance(axis, slice) for axis in where):
-        total[where] += values
-    else:
-        np.add.at(total, where, values)
-
-
-def _minimise(form: _Form, guess: Array, limits: SolverLimits) -> tuple[SolutionResult, Array, Details]:
-    """The optimum, checked: a solver may be wrong. `guess` (n,): where to start; not finite: nowhere."""
-    nothing = np.full(len(guess), np.nan), Details()
-    if (fault := form.fault()) is not None:
-        return fault, *nothing
-    if form.may_recede() and form.relaxed().solve(limits)[0] == UNBOUNDED:
-        feasible = form.without_cost().solve(limits)[0]
-        return UNBOUNDED if feasible == FOUND else feasible, *nothing
-    guessed = form.is_met(guess)
-    cost = form.cost(guess) if guessed else math.inf
-    ended, x, details = form.solve(limits, cost + _AGAIN * abs(cost))
-    if ended == STOPPED and guessed and not form.cost(x) < cost:
-        x = guess
-    wrong = ended == FOUND and not form.is_met(x)
-    if ended == INFEASIBLE:
-        wrong = guessed or form.without_cost().solve(limits)[0] == FOUND
-    return FAILED if wrong else ended, x, details
+def _fill(result: MathematicalProgramResult, variables: Array, optimum: Optimum, cost: float) -> None:
+    """Put a solution into a result of Drake."""
+    # Python can set neither its variables nor its cost: CLP does, for a program without constraints. It takes no binary
+    # variables, so continuous ones stand in for them.
+    shell, binary = MathematicalProgram(), Variable.Type.BINARY
+    stand_ins = [Variable(x.get_name()) if x.get_type() == binary else x for x in variables]
+    shell.AddDecisionVariables(np.array(stand_ins, dtype=object))
+    shell.AddLinearCost(np.zeros(len(variables)), cost, shell.decision_variables())
+    ClpSolver().Solve(shell, None, None, result)
+    result.set_x_val(optimum.x)
+    result.set_solution_result(optimum.ended)
 
 
 class DaqpResult(MathematicalProgramResult):  # type: ignore[misc]
@@ -322,11 +333,6 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
 
     NAME = "DAQP"
     _ID = SolverId(NAME)
-
-    def __init__(self) -> None:
-        """Each thread keeps the layout of its last program: with other coefficients it is solved sooner."""
-        super().__init__()
-        self._of_thread = threading.local()
 
     @classmethod
     def id(cls) -> SolverId:
@@ -381,15 +387,12 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
             raise ValueError(why)
         limits = _limits(prog.solver_options(), solver_options)
         guess = prog.initial_guess() if initial_guess is None else np.asarray(initial_guess, dtype=np.float64)
-        layout: _Layout | None = getattr(self._of_thread, "layout", None)
-        if layout is None or not layout.fits(prog):
-            layout = self._of_thread.layout = _Layout(prog)
-        form = _Form.of(prog, layout)
-        ended, x, details = _minimise(form.relaxed() if limits.relaxed else form, guess, limits)
+        form = Form.of(prog)
+        optimum = form.minimise(guess, limits)
         filled = DaqpResult() if result is None else result
-        layout.fill(filled, ended, x, _COSTS.get(ended) or form.cost(x))
+        _fill(filled, prog.decision_variables(), optimum, _COSTS.get(optimum.ended) or form.cost(optimum.x))
         if isinstance(filled, DaqpResult):
-            filled._index, filled._details = layout.index, details
+            filled._index, filled._details = prog.decision_variable_index(), optimum.details
         return filled if result is None else None
 
 

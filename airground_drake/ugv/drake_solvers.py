@@ -11,14 +11,13 @@ from pydrake.solvers import CommonSolverOption, GurobiSolver, MosekSolver, Solut
 
 from airground_drake.base.arrays import Array
 from airground_drake.ugv.binary_program import BinaryProgram
-from airground_drake.ugv.daqp_solver import DaqpSolver, Details
+from airground_drake.ugv.daqp_solver import DaqpSolver, SolverLimits
 
 # Classes of solvers by the name in `gatekeeper.solver`.
 SOLVERS: dict[str, Any] = {"daqp": DaqpSolver, "gurobi": GurobiSolver, "mosek": MosekSolver}
 
 # Their options for a limit in time, s, and for a proven optimum: Gurobi and Mosek stop at a gap by default.
 OPTIONS: dict[str, tuple[str, dict[str, float]]] = {
-    "daqp": ("time_limit", {}),
     "gurobi": ("TimeLimit", {"MIPGap": 0.0, "MIPGapAbs": 0.0}),
     "mosek": ("MSK_DPAR_MIO_MAX_TIME", {"MSK_DPAR_MIO_TOL_REL_GAP": 0.0, "MSK_DPAR_MIO_TOL_ABS_GAP": 0.0}),
 }
@@ -51,35 +50,33 @@ class Minimiser:
             raise ValueError(why)
         self._solver = SOLVERS[name]()
         self._licence = self._solver.AcquireLicense() if hasattr(self._solver, "AcquireLicense") else None
-        self._limit, self._exact = OPTIONS[name]
+        self._limit, self._exact = OPTIONS.get(name, ("", {}))
 
     def minimise(self, binary: BinaryProgram, guess: Array, seconds: float = math.inf) -> SolverResult:
         """The optimum of (26), searched for no longer than `seconds` by the clock; DAQP looks at it every 32 nodes."""
-        given = self._exact | ({self._limit: max(seconds, 1e-6)} if seconds < math.inf else {})
-        started = time.monotonic()
-        result = _solved(self._solver, binary, guess, given)
-        late = result.ended == "solver_failed" and time.monotonic() - started >= seconds
-        return SolverResult(None, "budget_spent") if late else result
-
-
-_RELAXING = DaqpSolver()
+        if isinstance(self._solver, DaqpSolver):
+            return _by_daqp(binary, guess, SolverLimits(max(seconds, 1e-6)))
+        started, options = time.monotonic(), SolverOptions()
+        options.SetOption(CommonSolverOption.kMaxThreads, 1)
+        for option, value in (self._exact | ({self._limit: seconds} if seconds < math.inf else {})).items():
+            options.SetOption(self._solver.solver_id(), option, value)
+        result = self._solver.Solve(binary.program, guess, options)
+        if result.is_success():
+            return SolverResult(result.get_x_val()[: binary.count], "optimal")
+        limited = result.get_solution_result() == SolutionResult.kIterationLimit
+        late = time.monotonic() - started >= seconds
+        return SolverResult(None, "budget_spent" if limited or late else "solver_failed")
 
 
 def relax(binary: BinaryProgram, seconds: float = math.inf, iterations: int = 10_000) -> SolverResult:
     """The optimum of (27), by DAQP, within `iterations` of the active-set method and `seconds` by the clock."""
-    limit = {"time_limit": max(seconds, 1e-6)} if seconds < math.inf else {}
-    return _solved(_RELAXING, binary, None, {"relaxed": 1, "iter_limit": iterations} | limit)
+    return _by_daqp(binary, None, SolverLimits(max(seconds, 1e-6), iterations, relaxed=1))
 
 
-def _solved(solver: Any, binary: BinaryProgram, guess: Array | None, given: dict[str, float]) -> SolverResult:
-    options = SolverOptions()
-    options.SetOption(CommonSolverOption.kMaxThreads, 1)
-    for option, value in given.items():
-        options.SetOption(solver.solver_id(), option, value)
-    result = solver.Solve(binary.program, guess, options)
-    details = result.get_solver_details()
-    effort = (details.iterations, details.multipliers) if isinstance(details, Details) else (0, None)
-    if result.is_success():
-        return SolverResult(result.get_x_val()[: len(binary.omega)], "optimal", *effort)
-    limited = result.get_solution_result() == SolutionResult.kIterationLimit
+def _by_daqp(binary: BinaryProgram, guess: Array | None, limits: SolverLimits) -> SolverResult:
+    ended, x, details = binary.form.minimise(guess, limits)
+    effort = details.iterations, details.multipliers
+    if ended == SolutionResult.kSolutionFound:
+        return SolverResult(x[: binary.count], "optimal", *effort)
+    limited = ended == SolutionResult.kIterationLimit
     return SolverResult(None, "budget_spent" if limited else "solver_failed", *effort)

@@ -13,7 +13,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import Cores, away_from
 from airground_drake.verify.runs.control_law import PLANE, least_speeds, retreats
 from oracles.control_law import Asked, Inequalities, commanded, tracking
-from oracles.turning import able
+from oracles.turning import able, edges
 from oracles.turning import rates as rates_of
 
 AT_ONCE = 5_000_000
@@ -48,8 +48,8 @@ class Scene(NamedTuple):
         safe: distances to keep from all of these, (M + K + L,), m.
         share: of the inequalities, (M + K + L,).
         speed: expected of them at most, (M + K + L,), m/s; 0: the passive law does not apply.
-        heading: of a unicycle, (), rad.
-        numbers: of a unicycle, (4,), see `turning`.
+        heading: of a unicycle or car, (), rad.
+        numbers: of a unicycle or car, (5,), see `turning`.
     """
 
     here: Array
@@ -137,6 +137,7 @@ def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterato
         bound = least_speeds(distance, scenes.safe, scenes.share, control, scenes.speed)
         retreat = retreats(distance, scenes.safe, scenes.speed, h)
         given = Inequalities(normal * PLANE, bound, retreat if retreat.any() else None)
+        given = given.also(*edges(heading, scenes.numbers))
         own = tracking(place, scenes.preset[:, k], rates[:, k], control.motion_gain_1_s, scenes.limit)
         rows = np.flatnonzero(scenes.executed[:, k])
         asked = Asked(scenes.wanted[rows, k], wishes[rows, k], scenes.chosen[rows])

@@ -28,7 +28,7 @@ from oracles.control_law import (
 )
 from oracles.fault import Fault
 from oracles.protocol import executed_at
-from oracles.turning import able, numbers_of
+from oracles.turning import able, edges, numbers_of
 
 COMMAND_TOLERANCE_M_S = 1e-6
 """A command may differ from the law by this, m/s. Both are evaluated at the same recorded positions and differ by
@@ -68,7 +68,9 @@ def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
     """(6) with avoidance and the proposal that the UGV should execute, if any, by the priorities of the method."""
     scenario, t = trace.scenario, trace.t[samples]
     position, recorded = trace.as_seen(ugv, ugv), trace.chosen(ugv)
-    given = as_seen(trace, ugv)
+    given, numbers = as_seen(trace, ugv), numbers_of(trace, ugv)
+    heading = trace.column(f"{ugv}.heading_rad")[samples] if numbers[0] else np.zeros(len(samples))
+    given = given.also(*edges(heading, numbers))
     limit = np.full(len(samples), scenario.ugvs[ugv].max_speed_m_s)
     executed = executed_at(trace, ugv)
     rows = np.flatnonzero([sent is not None for sent in executed])
@@ -84,8 +86,7 @@ def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
     for rate, wish in product(_preset_rates(waypoints, speed, t), asked):
         own = tracking(position, preset, rate, gain, limit)
         command = commanded(trace, position, own, given, rows, wish, limit)
-        if (numbers := numbers_of(trace, ugv))[0]:
-            heading = trace.column(f"{ugv}.heading_rad")[samples]
+        if numbers[0]:
             command = able(command, heading, numbers, scenario.control.period_s)
         away = np.linalg.norm(recorded - command, axis=1)
         closer = ~(away >= found.away)

@@ -35,6 +35,12 @@ class Inequalities(NamedTuple):
     bound: Array
     retreat: Array | None = None
 
+    def also(self, normal: Array, bound: Array) -> Inequalities:
+        """With further ones, (B, E, 3) and (B, E), of the lowest priority; they ask for no retreat."""
+        retreat = None if self.retreat is None else np.concatenate([self.retreat, np.zeros_like(bound)], axis=1)
+        both = (np.concatenate(parts, axis=1) for parts in ((self.normal, normal), (self.bound, bound)))
+        return Inequalities(*both, retreat)
+
     def slack(self, velocity: Array) -> Array:
         """Slack of velocities (B, 3) in each inequality, (B, K), m/s; inf where nothing is asked."""
         return np.asarray(np.einsum("bkd,bd->bk", self.normal, velocity) - self.bound)

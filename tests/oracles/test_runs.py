@@ -27,6 +27,7 @@ from airground_drake.verify.engines.outlines import Cores
 from oracles import ORACLES, beginnings, control_law, faults_of, inputs, predictions, way_left
 from oracles.mutants import PATIENCE, one_direction
 from oracles.protocol import executed_at
+from oracles.turning import edges, numbers_of
 from oracles.way_left import bounds_of_way_left
 
 Run = Callable[..., Trace]
@@ -47,6 +48,25 @@ def test_every_shipped_run_has_no_fault_and_the_verdicts_that_its_scenario_decla
         assert not faults_of(trace), name
         for verdict in judge(trace):
             assert verdict.as_expected is not False, (name, verdict.claim.id, verdict)
+
+
+AHEAD = (
+    "{kind: ackermann, hand_point_m: 0.2, wheelbase_m: 0.3, max_steering_rad: 0.5}",
+    "{kind: unicycle, hand_point_m: 0.2, backwards: false}",
+)
+
+
+@pytest.mark.parametrize("plant", AHEAD)
+def test_a_run_of_a_robot_that_only_drives_ahead_has_no_fault(plant: str) -> None:
+    """Its heading at the start is across its way, so that the inequalities of its plant bind."""
+    turned = f"{plant[:-1]}, heading_rad: 1.2}}"
+    trace = simulate(load("minimal", [f"ugvs.ugv1.plant={turned}", "duration_s=12"]), "d")
+    assert not faults_of(trace)
+    heading = trace.column("ugv1.heading_rad")[trace.sample_rows]
+    normal, _ = edges(heading, numbers_of(trace, "ugv1"))
+    beyond = np.einsum("bkd,bd->bk", normal, trace.chosen("ugv1")).min(axis=1)
+    assert (beyond < 1e-9).any()
+    assert (beyond >= 0.0).all()
 
 
 DOOR = """

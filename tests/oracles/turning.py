@@ -1,4 +1,4 @@
-"""What unicycles can do of their commands, written again: many commands at once, limits found by halving."""
+"""What unicycles and cars can do of their commands, written again: many at once, limits found by halving."""
 
 from __future__ import annotations
 
@@ -7,18 +7,31 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.sim.trace import Trace
 
-UNLIMITED = np.array([0.0, np.inf, 0.0, np.inf])
-"""The numbers of a robot that is no unicycle: hand point, m, turning limit, rad/s, wheel base, m, wheel speed, m/s."""
+UNLIMITED = np.array([0.0, np.inf, 0.0, np.inf, np.nan])
+"""The numbers of a robot that does not turn: hand point, m, turning limit, rad/s, wheel base, m, wheel speed, m/s, and
+the largest angle of a command to the heading, rad; NaN: any."""
 HALVINGS = 60
 
 
 def numbers_of(trace: Trace, ugv: str) -> Array:
-    """These numbers of a UGV, (4,)."""
+    """These numbers of a UGV, (5,)."""
     for plant in trace.scenario.ugvs[ugv].plant:
         if plant.kind == "unicycle":
             turn, wheel = plant.max_turn_rad_s or np.inf, plant.max_wheel_speed_m_s or np.inf
-            return np.array([plant.hand_point_m, turn, plant.wheel_base_m, wheel])
+            aside = np.nan if plant.backwards else 0.5 * np.pi
+            return np.array([plant.hand_point_m, turn, plant.wheel_base_m, wheel, aside])
+        if plant.kind == "ackermann":
+            aside = np.arctan(plant.hand_point_m * np.tan(plant.max_steering_rad) / plant.wheelbase_m)
+            return np.array([plant.hand_point_m, np.inf, 0.0, np.inf, aside])
     return UNLIMITED
+
+
+def edges(heading: Array, numbers: Array) -> tuple[Array, Array]:
+    """Half-planes normal.v >= bound of commands that robots with headings (B,), rad, can follow: (B, 2, 3), (B, 2)."""
+    aside = np.broadcast_to(numbers, (len(heading), 5))[:, 4]
+    bound = np.repeat(np.where(np.isnan(aside), -np.inf, 0.0)[:, None], 2, axis=1)
+    towards = heading[:, None] + np.array([1.0, -1.0]) * (np.nan_to_num(aside) - 0.5 * np.pi)[:, None]
+    return np.stack([np.cos(towards), np.sin(towards), np.zeros_like(towards)], axis=2), bound
 
 
 def rates(command: Array, heading: Array, numbers: Array, period_s: float) -> tuple[Array, Array]:
@@ -34,12 +47,14 @@ def rates(command: Array, heading: Array, numbers: Array, period_s: float) -> tu
 
 
 def able(command: Array, heading: Array, numbers: Array, period_s: float) -> Array:
-    """Commands (B, 3), m/s, shortened as far as the limits (B, 4) of unicycles with headings (B,), rad, ask for."""
-    numbers = np.broadcast_to(numbers, (len(command), 4))
+    """Commands (B, 3), m/s, shortened as far as the limits (B, 5) of robots with headings (B,), rad, ask for."""
+    numbers, heading = np.broadcast_to(numbers, (len(command), 5)), np.broadcast_to(heading, len(command))
+    normal, bound = edges(heading, numbers)
+    command = np.where((np.einsum("bkd,bd->bk", normal, command) < bound).any(axis=1)[:, None], 0.0, command)
     turns = np.flatnonzero(numbers[:, 0] > 0.0)
     if not len(turns):
         return command
-    few, at, by = command[turns], np.broadcast_to(heading, len(command))[turns], numbers[turns]
+    few, at, by = command[turns], heading[turns], numbers[turns]
 
     def possible(share: Array) -> Array:
         speed, turning = rates(share[:, None] * few, at, by, period_s)

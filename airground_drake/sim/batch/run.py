@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import time
 from collections.abc import Sequence
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -38,6 +39,7 @@ from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, accepted_proposals, sightings
 from airground_drake.uav.planner import PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
+from airground_drake.ugv.answer import GatekeeperDecision
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 
 
@@ -55,6 +57,7 @@ class Batch:
         """Set it up: everything that does not depend on the seed."""
         self.scenario, self.name = scenario, name
         run, given = scenario.runs[name], own(scenario, name)
+        self.given = given
         method, control = method_of(run.method), given.control
         self.world = world = make_world(given)
         n, r = len(world.names("ugv")), len(world.robots)
@@ -81,7 +84,7 @@ class Batch:
         breaks, places = components.stack_presets(presets)
         scripts = [vertices_of(body) for body in world.moving[r:]]
         gated, steering = self.gatekeepers is not None, world.steering
-        periods = {loop.PLAN: self.planner.period, **({loop.GATE: given.gatekeeper.period_s} if gated else {})}
+        periods = ((loop.PLAN, self.planner.period), *([(loop.GATE, given.gatekeeper.period_s)] if gated else []))
         ticks, due = _schedule(scenario.duration_s, control.period_s, noise.noise_period_s, periods)
         shortest = min(control.period_s, noise.noise_period_s)
         self.draws = int(scenario.duration_s / noise.noise_period_s) + 2
@@ -114,9 +117,14 @@ class Batch:
             body.plant.heading_rad if isinstance(body.plant, Unicycle) else 0.0 for body in world.bodies[:n]
         ])  # fmt: skip
         self.rows = int(1.3 * len(ticks)) + 400
-        sampling_s = [control.period_s, 0.0]
-        self.meta: dict[str, Any] = {
-            "zeta_m": float(zeta),
+        self.zeta = float(zeta)
+
+    @cached_property
+    def meta(self) -> dict[str, Any]:
+        """What only the simulation knows, for its traces."""
+        r, sampling_s = len(self.world.robots), [self.given.control.period_s, 0.0]
+        return {
+            "zeta_m": self.zeta,
             "controllers": {
                 "ugv_controller": of_ugvs(self.near.ugvs, self.law, r, sampling_s),
                 "uav_controller": read_back(self.near.uav, self._avoidance, r, sampling_s),
@@ -136,13 +144,18 @@ class Batch:
             SimulationError: if planner or gatekeeper stop the run; names it and the time.
             LeftToDrakeError: if the run ends in another error.
         """
+        return self.made(seed).trace()
+
+    def made(self, seed: int | None = None) -> Going:
+        """The run with a seed at its end; raises as `simulate`."""
         started = time.perf_counter()
         try:
             run = self.begin(seed)
             run.advance(self.scenario.duration_s)
         finally:
             self.database.close()
-        return run.trace(time.perf_counter() - started)
+        run.wall_s = time.perf_counter() - started
+        return run
 
     def begin(self, seed: int | None = None) -> Going:
         """A run at its initial state."""
@@ -195,6 +208,7 @@ class Going:
         self._executed: list[Proposal | None] = [None] * n
         self._accepted = _accepted(self._executed)
         self._ahead: PlannerState | None = None
+        self.wall_s = 0.0  # its duration by the clock, if it was made at one go
         self.advance(0.0)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -230,16 +244,30 @@ class Going:
             elif code == loop.PYTHON:
                 self._update()
             else:
-                raise LeftToDrakeError("the run ends in an error")
+                raise LeftToDrakeError("a run that ends in an error")
 
     def plan_ahead(self) -> None:
         """Plan for this instant, before its updates, which then take this result; the last one counts."""
         self._ahead = self._planned()
 
-    def trace(self, wall_s: float = 0.0) -> Trace:
-        """The trace of the run until now; `wall_s`: its duration by the clock."""
-        batch, rows = self._batch, int(self._state.counts[1])
-        log = Log(*(column[:rows] for column in self._log))
+    @property
+    def log(self) -> Log:
+        """The rows until now."""
+        return Log(*(column[: self._state.counts[1]] for column in self._log))
+
+    @property
+    def memory(self) -> PlannerState:
+        """What the planner remembers."""
+        return self._memory
+
+    @property
+    def decided(self) -> Sequence[GatekeeperDecision]:
+        """The decisions of the gatekeepers."""
+        return self._answering.made
+
+    def trace(self) -> Trace:
+        """The trace of the run until now."""
+        batch, log = self._batch, self.log
         logged = {
             "bodies": log.bodies, "team_command": log.command, "reference": log.reference, "noise": log.noise,
             "decision_variable": log.x, "status": log.status, "executing": log.executing,
@@ -249,11 +277,11 @@ class Going:
         done = Done(
             t=log.t,
             logged={name: rows.T for name, rows in logged.items()},
-            memories={batch.planner.sender.uav: self._memory},
-            decided=self._answering.made,
+            memories={batch.planner.sender.uav: self.memory},
+            decided=self.decided,
             seed=self._seed,
             until_s=self.t,
-            wall_s=wall_s,
+            wall_s=self.wall_s,
             meta=batch.meta,
         )
         return trace_of(batch.scenario, batch.name, batch.world, done, batch.world.signals)
@@ -318,21 +346,22 @@ class Going:
         ]
 
 
+@lru_cache(maxsize=8)
 def _schedule(
-    duration_s: float, control_s: float, noise_s: float, periods: dict[int, float]
+    duration_s: float, control_s: float, noise_s: float, periods: tuple[tuple[int, float], ...]
 ) -> tuple[Array, loop.Ints]:
     """Times of all timed events, s, and what is due then: with Drake's own arithmetic, k times the period."""
     found: dict[float, int] = {}
     for bit, period in ((loop.CONTROL, control_s), (loop.NOISE, noise_s)):
         for k in range(int(duration_s / period) + 2):
             found[k * period] = found.get(k * period, 0) | bit
-    for bit, period in periods.items():
+    for bit, period in periods:
         ticks = Ticks(period, control_s)
         for k in range(int(duration_s / ticks.period) + 2):
             t = k * ticks.period
             found[t] = found.get(t, 0) | (bit if ticks.due(t) else 0)
     times = sorted(found)
-    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)
+    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)  # nothing writes to them
 
 
 def _holds(breaks: Array, places: Array) -> Array:

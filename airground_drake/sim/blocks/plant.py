@@ -155,10 +155,14 @@ class OwnPlant(NamedTuple):
 
 
 def declared(
-    scenario: Scenario, plants: Mapping[str, OwnPlant], ugv_controller: Callable[..., System] | None = None
+    scenario: Scenario,
+    plants: Mapping[str, OwnPlant],
+    ugv_controller: Callable[..., System] | None = None,
+    seed: int | None = None,
 ) -> Scenario:
     """A valid scenario in which some robots have users' plants, by name, and the UGVs a user's controller."""
-    changed = copy.deepcopy(scenario)
+    # seed: in place of the scenario's.
+    changed = copy.deepcopy(scenario) if plants or ugv_controller is not None else scenario
     for robot, code in plants.items():
         if robot not in changed.robots:
             raise UnknownNameError("robot", robot, changed.robots)
@@ -176,7 +180,7 @@ def declared(
             told = short(repr(ugv_controller))
             raise PluginError(f"ugv_controller is {told}; allowed: a subclass of Drake's System, or a function")
         changed.ugv_controller = OwnController(kind=name_of(ugv_controller))
-    return validated(changed)
+    return validated(changed, {} if seed is None else {"seed": seed})
 
 
 class OwnCode(NamedTuple):

@@ -19,7 +19,7 @@ from airground_drake.report.sentences import MARKS, Line
 from airground_drake.report.templating import environment_of
 from airground_drake.report.view import canvas, svg
 from airground_drake.study.campaign import swept
-from airground_drake.study.campaign.rows import BATCH, BOTH, CLOCK, DRAKE, JUDGED
+from airground_drake.study.campaign.rows import BATCH, BOTH, CLOCK, DRAKE, JUDGED, SCREENED
 
 BARS = 40
 MOST_TOLD = 8  # sentences about claims on the first screen; the others are folded
@@ -73,11 +73,14 @@ def told(result: Mapping[str, Any]) -> list[Line]:
 
 def made_by(engines: Mapping[str, int]) -> str:
     """Who made the runs, in words."""
-    compared, clock = engines.get(BOTH, 0), engines.get(CLOCK, 0)
-    loop = engines.get(BATCH, 0) + compared + clock
+    screens, compared, clock = (engines.get(name, 0) for name in (SCREENED, BOTH, CLOCK))
+    loop = screens + engines.get(BATCH, 0) + compared + clock
     said = [f"Drake made {engines[DRAKE]} of these runs"] if engines.get(DRAKE) else []
     if loop:
         said.append(f"the compiled loop made {loop}, and Drake {compared} of them again, bit by bit the same")
+    if screens:
+        others = "all others and Drake's were judged by their traces"
+        said.append(f"array judges screened {screens} of them without a trace, which proves nothing; {others}")
     if clock:
         said.append(f"{clock} are not compared, because a policy met its limit of time by the clock")
     told = "; ".join(said)

@@ -7,9 +7,9 @@ import hashlib
 import json
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,13 +30,16 @@ from airground_drake.study.campaign.rows import (
     DRAKE,
     INVALID,
     JUDGED,
+    SCREENED,
     STOPPED,
     Row,
     blank,
 )
+from airground_drake.study.campaign.screening import happened, happened_in, screened
 from airground_drake.study.campaign.spec import Spec
 from airground_drake.uav.guest.time_limit import OutOfTime, time_limit
 from airground_drake.verify import Verdict, judge
+from airground_drake.verify.array_judges import SAME
 
 SHARE = 0.005  # of the runs that the loop made and nothing is wrong with, which Drake makes again
 
@@ -45,8 +48,16 @@ class DrawOutOfTime(BaseException):
     """A draw took too long. An Exception or an OutOfTime would count as a fault of a policy, so it is neither."""
 
 
-class EnginesDifferError(AirgroundError):
-    """Drake and the compiled loop made different runs of one draw; it ends a campaign."""
+class DifferenceError(AirgroundError):
+    """What must come to the same did not; it ends a campaign."""
+
+
+class EnginesDifferError(DifferenceError):
+    """Drake and the compiled loop made different runs of one draw."""
+
+
+class JudgesDifferError(DifferenceError):
+    """An array judge and the judge of traces came to different verdicts on one run."""
 
 
 def rows_of(spec: Spec, index: int, limits: Limits, engine: Engine = "batch") -> list[Row]:
@@ -80,7 +91,7 @@ def rows_of_scenario(
         with _within(spec, scenario, limits):
             rows = [row for run in scenario.runs for row in _rows_of_run(scenario, run, spec.claims, common, engine)]
             return rows
-    except EnginesDifferError:
+    except DifferenceError:
         raise
     except AirgroundError as error:
         return [common | {"ended": INVALID, "what": one_line(str(error))}]
@@ -89,7 +100,7 @@ def rows_of_scenario(
     finally:
         _keep_what_is_loaded()
         # Python does not see the size of a diagram, and would wait for hundreds.
-        if any(row["engine"] != BATCH for row in rows or [common]):
+        if any(row["engine"] not in (BATCH, SCREENED) for row in rows or [common]):
             gc.collect()
 
 
@@ -109,33 +120,71 @@ def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: 
     common = common | {"run": run, "method": scenario.runs[run].method, "duration_s": scenario.duration_s}
     started = time.perf_counter()
     try:
-        trace, made_by = _made(scenario, run, engine)
-        verdicts = judge(trace, claims=claims or None)
-        if made_by == BATCH and _is_for_drake(common["index"], run, verdicts):
-            made_by = _compared(trace, simulate(scenario, run))
-    except EnginesDifferError:
+        judged = _judged(scenario, run, claims, common["index"], engine)
+    except DifferenceError:
         raise
     except (Exception, SystemExit) as error:
         return [common | {"ended": STOPPED, "what": described(error)}]
-    common |= {"ended": JUDGED, "engine": made_by, "wall_s": time.perf_counter() - started, **_happened(trace)}
-    return [common | _of_claim(verdict) for verdict in verdicts] or [common | {"what": "no claim is about this run"}]
+    common |= {"ended": JUDGED, "engine": judged.engine, "wall_s": time.perf_counter() - started, **judged.happened}
+    rows = [common | _of_claim(verdict) for verdict in judged.verdicts]
+    return rows or [common | {"what": "no claim is about this run"}]
 
 
-def _made(scenario: Scenario, run: str, engine: Engine) -> tuple[Trace, str]:
-    """The trace of a run, and who made it: the loop, if it can and may."""
-    if engine == BATCH:
-        with suppress(LeftToDrakeError):
-            return Batch(scenario, run).simulate(), BATCH
-    return simulate(scenario, run), DRAKE
+class _Judged(NamedTuple):
+    """A run that was made and judged."""
+
+    verdicts: Sequence[Verdict]
+    happened: Row
+    engine: str  # see `rows.COLUMNS`
 
 
-def _is_for_drake(index: int, run: str, verdicts: Sequence[Verdict]) -> bool:
-    """Whether Drake makes a run of the loop again: what fails undeclared, and a share of all, chosen by hash."""
-    # A narrow margin is no reason: every verdict is that of the full judge, about a trace that is Drake's to the bit.
+def _judged(scenario: Scenario, run: str, claims: Collection[str], index: int, engine: Engine) -> _Judged:
+    """A run by the loop, if it can and may, and by Drake where it is for Drake; screened, if that is enough."""
+    try:
+        if engine != BATCH:
+            raise LeftToDrakeError
+        loop = Batch(scenario, run)
+        made = loop.made()
+    except LeftToDrakeError:
+        trace = simulate(scenario, run)
+        return _Judged(judge(trace, claims=claims or None), happened_in(trace), DRAKE)
+    screens = screened(loop, made, claims)
+    chosen = _is_chosen(index, run)
+    if screens and not chosen and not any(_is_failure(verdict) for verdict in screens):
+        return _Judged(screens, happened(loop, made), SCREENED)
+    trace = made.trace()
+    verdicts = judge(trace, claims=claims or None)
+    _agree(screens, verdicts, trace)
+    if chosen or any(_is_failure(verdict) for verdict in verdicts):
+        return _Judged(verdicts, happened_in(trace), _compared(trace, simulate(scenario, run)))
+    return _Judged(verdicts, happened_in(trace), BATCH)
+
+
+def _is_chosen(index: int, run: str) -> bool:
+    """Whether Drake makes a run of the loop again though nothing is wrong with it: a share of all, chosen by hash."""
     told = hashlib.sha256(f"{index} {run}".encode()).digest()
-    return int.from_bytes(told[:8]) < SHARE * 2**64 or any(
-        verdict.status not in (*PASSING, "not_run") and verdict.as_expected is not True for verdict in verdicts
-    )
+    return int.from_bytes(told[:8]) < SHARE * 2**64
+
+
+def _is_failure(verdict: Verdict) -> bool:
+    """Whether Drake makes a run again for a verdict: it fails, and the scenario does not say that it may."""
+    # A narrow margin is no reason. Array judges leave what they cannot tell to the judge of traces, whose verdicts are
+    # about traces that are Drake's to the bit.
+    return verdict.status not in (*PASSING, "not_run") and verdict.as_expected is False
+
+
+def _agree(screens: Sequence[Verdict], verdicts: Sequence[Verdict], trace: Trace) -> None:
+    """Raise a JudgesDifferError where an array judge came to something else than the judge of traces."""
+    for ours, theirs in zip(screens, verdicts, strict=True) if screens else ():
+        numbers = [float("nan") if verdict.margin is None else verdict.margin for verdict in (ours, theirs)]
+        same = (ours.status, ours.exercised) == (theirs.status, theirs.exercised)
+        if not same or not np.isclose(numbers[0], numbers[1], rtol=0.0, atol=SAME, equal_nan=True):
+            told = [
+                f"{verdict.status}, margin {verdict.margin}, {verdict.exercised} times" for verdict in (ours, theirs)
+            ]
+            where = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}"
+            said = f"{where}: {ours.claim.id} is {told[1]} by the trace and {told[0]} by the array judge"
+            raise JudgesDifferError(one_line(f"{said}; --engine drake does without"))
 
 
 def _compared(trace: Trace, by_drake: Trace) -> str:
@@ -168,23 +217,4 @@ def _of_claim(verdict: Verdict) -> Row:
         "margin": float("nan") if finding.margin is None else float(finding.margin),
         "unit": finding.unit,
         "exercised": float("nan") if finding.exercised is None else float(finding.exercised),
-    }
-
-
-def _happened(trace: Trace) -> Row:
-    """Triggers, arrivals of UGVs, and decisions of a run."""
-    triggers = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
-    arrivals = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
-    # Each row has the state of the interval before it.
-    intervened_s = [float(np.diff(trace.t) @ (trace.executing(ugv)[1:] >= 0)) for ugv in trace.ugvs]
-    return {
-        "ugvs": len(trace.ugvs),
-        "triggers": len(triggers),
-        "first_trigger_s": min(triggers, default=float("nan")),
-        "arrived": len(arrivals),
-        "arrival_s": max(arrivals, default=float("nan")),
-        "decisions": len(trace.decisions),
-        "accepted": int((trace.decisions["decision"] == "accept").sum()),
-        "faults": len(trace.meta["faults"]),
-        "intervened_s": max(intervened_s, default=0.0),
     }

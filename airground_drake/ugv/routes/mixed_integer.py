@@ -66,13 +66,13 @@ class MixedIntegerRoute:
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         binary = self._programs.of(problem.stages, min(self._blocks or problem.stages, problem.stages))
-        normals = normals_along(problem, constants.better.positions)
-        shares, bound = _relaxed(binary, problem, normals)
-        known = _known(binary, problem, shares)
+        binary.update(problem, normals_along(problem, constants.better.positions))
+        shares, bound = _relaxed(binary)
+        known = _known(binary, shares)
         plan = problem.evaluate(cheap_plan(problem.terms, binary.block, known))
         plans = [plan, *map(problem.evaluate, known)]
-        search = _Searches(self._search, binary, problem, budget)
-        proof = search.along(normals, plans, bound)
+        search = _Searches(self._search, budget)
+        proof = search.along(binary, plans, bound)
         while proof.optimum is not None:
             optimum = proof.optimum.omega
             if not any(np.array_equal(optimum, candidate.omega) for candidate in plans):
@@ -80,7 +80,7 @@ class MixedIntegerRoute:
             plan = min(plans, key=lambda candidate: candidate.objective)
             if plan.objective >= proof.bound * (1.0 - _AGREE):
                 break
-            again = search.again(plan)
+            again = search.again(binary, plan)
             if again is None or again.status != "optimal":
                 proof = replace(proof, status=again.status if again else proof.status)
                 break
@@ -98,53 +98,50 @@ class MixedIntegerRoute:
 class _Searches:
     """Searches for the optimum of one problem along several half-planes, which share a budget."""
 
-    def __init__(self, search: Minimiser, binary: BinaryProgram, problem: Problem, budget: Budget) -> None:
-        self._search, self._binary, self._problem, self._budget = search, binary, problem, budget
+    def __init__(self, search: Minimiser, budget: Budget) -> None:
+        self._search, self._budget = search, budget
         self._iterations, self._until = budget.search_iterations, time.monotonic() + budget.search_s
 
-    def along(self, normals: Array, known: Sequence[Evaluation], relaxed: float) -> _Proof:
-        """Search along half-planes with unit normals (N, m, 3), from the best of known plans."""
-        # The program has these half-planes; `relaxed` is the lower bound by its relaxation.
-        problem = self._problem
+    def along(self, binary: BinaryProgram, known: Sequence[Evaluation], relaxed: float) -> _Proof:
+        """Search from the best of known plans; `relaxed` is the lower bound by the relaxation."""
+        problem, normals = binary.problem, binary.normals
         costs = [problem.evaluate_half_planes(plan.positions, normals) for plan in known]
         best = int(np.argmin(costs))
         seconds = min(self._until - time.monotonic(), self._budget.left_s())
         if seconds <= 0.0:
             return _Proof("budget_spent", relaxed, normals)
-        result = self._search.minimise(self._binary, self._binary.guess(problem, known[best], normals), seconds)
+        result = self._search.minimise(binary, binary.guess(known[best]), seconds)
         self._iterations -= result.iterations
         status: Status = result.ended if self._iterations >= 0 else "budget_spent"
         if result.omega is None or status != "optimal":
             return _Proof(status, relaxed, normals)
-        optimum = problem.evaluate(self._binary.plan(result.omega.round()))
+        optimum = problem.evaluate(binary.plan(result.omega.round()))
         cost = problem.evaluate_half_planes(optimum.positions, normals)
         if cost > costs[best] * (1.0 + _AGREE):  # the solver is wrong
             return _Proof("solver_failed", relaxed, normals)
         return _Proof("optimal", min(cost, costs[best]), normals, optimum)
 
-    def again(self, plan: Evaluation) -> _Proof | None:
+    def again(self, binary: BinaryProgram, plan: Evaluation) -> _Proof | None:
         """Search along half-planes at a plan; None if the relaxation shows that this would be long."""
-        normals = normals_along(self._problem, plan.positions)
-        bound = _relaxed(self._binary, self._problem, normals)[1]
-        return None if bound < (1.0 - _WORTH) * plan.objective else self.along(normals, [plan], bound)
+        binary.update(binary.problem, normals_along(binary.problem, plan.positions))
+        bound = _relaxed(binary)[1]
+        return None if bound < (1.0 - _WORTH) * plan.objective else self.along(binary, [plan], bound)
 
 
-def _known(binary: BinaryProgram, problem: Problem, shares: Array | None) -> list[Array]:
-    """Plans (N,) without a search: constant ones, the rest of the previous one, sum-up rounding; a lower bound."""
-    count = len(binary.omega)
-    known = [np.ones(count), np.zeros(count)]
-    if problem.previous is not None:
-        known.append(binary.blocked(problem.previous))
+def _known(binary: BinaryProgram, shares: Array | None) -> list[Array]:
+    """Plans (N,) without a search: constant ones, the rest of the previous one, sum-up rounding."""
+    known = [np.ones(binary.count), np.zeros(binary.count)]
+    if binary.problem.previous is not None:
+        known.append(binary.blocked(binary.problem.previous))
     if shares is not None:
         known.append(sum_up_rounding(shares))
     return distinct([binary.plan(values) for values in known])
 
 
-def _relaxed(binary: BinaryProgram, problem: Problem, normals: Array) -> tuple[Array | None, float]:
-    """Shares (B,) of the relaxation along half-planes with unit normals (N, m, 3), and its lower bound."""
-    binary.update(problem, normals)
+def _relaxed(binary: BinaryProgram) -> tuple[Array | None, float]:
+    """Shares (B,) of the relaxation along the half-planes, and its lower bound."""
     shares = relax(binary).omega
     if shares is None:
         return None, -math.inf
     shares = shares.clip(0.0, 1.0)
-    return shares, dual_bound(problem, normals, binary.plan(shares))
+    return shares, dual_bound(binary.problem, binary.normals, binary.plan(shares))

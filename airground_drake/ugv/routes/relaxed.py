@@ -40,9 +40,8 @@ class RelaxedRoute:
         return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
-        stages = problem.stages
         normals = normals_along(problem, constants.better.positions)
-        program = self._programs.of(stages, stages)
+        program = self._programs.of(problem.stages, problem.stages)
         program.update(problem, normals)
         result = relax(program, budget.left_s(), ACTIVE_SETS * budget.iterations)
         if result.omega is None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
+from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.collisions import first_collisions
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
@@ -52,14 +53,17 @@ class LiveGoal(TraceClaim):
         stalls = trace.scenario.runs[trace.run].stalls_m
         if unknown := set(stalls) - set(trace.ugvs):
             raise TraceError(f"stalls_m names {sorted(unknown)}, which are not UGVs of the trace")
-        judged = list(_conditions(trace, stalls))
-        conditions = [condition.entry for condition in judged]
+        counting = {robot: trace.counting_rows(robot) for robot in trace.robots}
+        ways = {robot: Way(trace.t[:rows], trace.position(robot)[:rows]) for robot, rows in counting.items()}
+        last = np.array([trace.position(ugv)[-1] for ugv in trace.ugvs])
+        judged = list(conditions(trace.scenario, stalls, ways, last))
+        entries = [condition.entry for condition in judged]
         had_a_way = [condition.entry["robot"] for condition in judged if condition.had_a_way]
         hits = first_collisions(trace.events)
-        for entry in conditions:
+        for entry in entries:
             if entry["robot"] in hits:
                 entry["collided_s"] = hits[entry["robot"]]["t_s"]
-        worst = min(conditions, key=lambda at: (at["margin_m"] >= 0.0, "collided_s" not in at, at["margin_m"]))
+        worst = min(entries, key=lambda at: (at["margin_m"] >= 0.0, "collided_s" not in at, at["margin_m"]))
         live = worst["margin_m"] >= 0.0
         return Finding(
             "holds" if live else "refuted",
@@ -68,7 +72,7 @@ class LiveGoal(TraceClaim):
             quantity="tolerance left about where a robot must end",
             where={key: worst[key] for key in ("robot", "condition", "collided_s") if key in worst},
             counterexample=None if live else worst,
-            evidence={"conditions": conditions, "had_a_way_to_go": had_a_way} | ({"kind": "stuck"} if stalls else {}),
+            evidence={"conditions": entries, "had_a_way_to_go": had_a_way} | ({"kind": "stuck"} if stalls else {}),
             exercised=len(had_a_way),
         )
 
@@ -80,49 +84,52 @@ class Condition(NamedTuple):
     had_a_way: bool = False
 
 
-def _conditions(trace: Trace, stalls: Mapping[str, Sequence[float]]) -> Iterator[Condition]:
+class Way(NamedTuple):
+    """Where a robot was, up to its first collision."""
+
+    t: Array  # (T,), s
+    position: Array  # (T, 3), m
+
+
+def conditions(
+    scenario: Scenario, stalls: Mapping[str, Sequence[float]], ways: Mapping[str, Way], last: Array
+) -> Iterator[Condition]:
     """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
-    scenario = trace.scenario
-    arrival = float(trace.scenario.arrival_tolerance_m)
-    for ugv in trace.ugvs:
-        target = scenario.ugvs[ugv].target_m
+    # last: where the n UGVs are at the end of the run, (n, 3), m
+    arrival = float(scenario.arrival_tolerance_m)
+    for ugv, given in scenario.ugvs.items():
         if ugv not in stalls:
-            yield _within(trace, ugv, "at its target", target, arrival)
+            yield _within(ways, ugv, "at its target", given.target_m, arrival)
             continue
-        yield _within(trace, ugv, "at its stall point", stalls[ugv], scenario.stall_tolerance_m)
-        moved = moved_at_the_end(trace, ugv)
+        yield _within(ways, ugv, "at its stall point", stalls[ugv], scenario.stall_tolerance_m)
+        moved = moved_at_the_end(ways[ugv])
         yield Condition({"robot": ugv, "condition": "stands", "moved_m": moved, "margin_m": AT_REST_M - moved})
-        away = float(np.linalg.norm(_end(trace, ugv) - target))
+        away = float(np.linalg.norm(ways[ugv].position[-1] - given.target_m))
         yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
     for name, uav in scenario.aerial.items():
         if stalls:
-            centroid = np.mean([trace.position(ugv)[-1] for ugv in scenario.in_charge(name)], axis=0)
-            over = centroid + np.array([0.0, 0.0, uav.altitude_m])
-            whose = "its UGVs" if len(scenario.aerial) > 1 else "the UGVs"
-            yield _within(trace, name, f"over the centroid of {whose}", over, arrival)
+            own = [ugv in scenario.in_charge(name) for ugv in scenario.ugvs]
+            over = last[own].mean(axis=0) + np.array([0.0, 0.0, uav.altitude_m])
+            whose = "the UGVs" if all(own) else "its UGVs"
+            yield _within(ways, name, f"over the centroid of {whose}", over, arrival)
         else:
-            yield _within(trace, name, "at its target", uav.target_m, arrival)
+            yield _within(ways, name, "at its target", uav.target_m, arrival)
 
 
-def _within(trace: Trace, robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float) -> Condition:
+def _within(
+    ways: Mapping[str, Way], robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float
+) -> Condition:
     """That a robot ends no farther from a point, (3,), m, than a tolerance."""
     there = np.asarray(point, dtype=np.float64)
-    begin, end = trace.position(robot)[0], _end(trace, robot)
+    begin, end = ways[robot].position[[0, -1]]
     before, after = (float(np.linalg.norm(place - there)) for place in (begin, end))
     at = {"robot": robot, "condition": condition, "point_m": there.tolist(), "final_m": end.tolist()}
     return Condition({**at, "distance_m": after, "margin_m": tolerance_m - after}, before > tolerance_m)
 
 
-def _end(trace: Trace, robot: str) -> Array:
-    """Where a robot is at the end of the run, or at the last row before its first collision, (3,), m."""
-    end: Array = trace.position(robot)[trace.counting_rows(robot) - 1]
-    return end
-
-
-def moved_at_the_end(trace: Trace, robot: str) -> float:
-    """Largest distance from the place of `_end` during the last `AT_REST_S` before it, m; convex between rows."""
-    rows = trace.counting_rows(robot)
-    t, position = trace.t[:rows], trace.position(robot)[:rows]
+def moved_at_the_end(way: Way) -> float:
+    """Largest distance from its last place during the last `AT_REST_S`, m; convex between rows."""
+    t, position = way
     begin = max(t[-1] - AT_REST_S, t[0])
     path = np.vstack([interpolate(t, position, begin), position[t >= begin]])
     return float(np.linalg.norm(path - position[-1], axis=1).max())

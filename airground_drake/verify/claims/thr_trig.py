@@ -13,7 +13,7 @@ import numpy as np
 
 from airground_drake.base.errors import TraceError
 from airground_drake.base.exact import decimal
-from airground_drake.scenario.schema import Threshold
+from airground_drake.scenario.schema import Decision, Threshold
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.engines.geometry import NormSignal
@@ -150,7 +150,11 @@ class TriggerLevels(NamedTuple):
 
 def levels_of(trace: Trace) -> TriggerLevels:
     """The levels of a run by its scenario."""
-    decision, zeta = trace.scenario.decision, float(trace.meta["zeta_m"])
+    return levels_by(trace.scenario.decision, float(trace.meta["zeta_m"]))
+
+
+def levels_by(decision: Decision, zeta: float) -> TriggerLevels:
+    """The levels by a scenario, with the threshold in force, m; TraceError if that is not the scenario's."""
     rule = decision.threshold
     if rule.rule == "fixed" and rule.zeta_m != zeta:
         raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")

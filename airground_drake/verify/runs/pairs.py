@@ -12,7 +12,7 @@ the points that it steers, which is more if a robot's plant takes room.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import ceil, inf
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
-from airground_drake.scenario.schema import MAP, Obstacle
+from airground_drake.scenario.schema import MAP, Obstacle, Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.geometry import (
@@ -115,16 +115,22 @@ def pairs_of(trace: Trace) -> tuple[Pair, ...]:
 
 def declared_pairs(trace: Trace) -> Iterator[Pair]:
     """All robot/barrier and robot/robot pairs, also those with barriers that do not appear before the end."""
-    scenario, bounds = trace.scenario, bounds_of(trace)
+    there = {name: (trace.there_from(name), trace.there_until(name)) for name in trace.scenario.barriers}
+    return pairs_by(trace.scenario, bounds_of(trace), there, len(trace.t) - 1)
+
+
+def pairs_by(
+    scenario: Scenario, bounds: Mapping[str, Bounds], there: Mapping[str, tuple[int, int]], end: int
+) -> Iterator[Pair]:
+    """All pairs, by bounds of the robots, the first and last row of each barrier, and the last row of all."""
     period, gain = scenario.control.period_s, scenario.control.avoidance_gain_1_s
-    there = {name: (trace.there_from(name), trace.there_until(name)) for name in scenario.barriers}
     for given in apart(scenario):
         first, second, *_ = given
         passive, share = given.kind == MOVING, 1.0 if second in there else 0.5
         own, other = bounds[first], bounds.get(second, AT_REST)
         speed = scenario.barriers[second].expected_speed_m_s if second in there else 0.0
         reach = (own.speed_m_s + (speed or other.speed_m_s)) * period
-        row, last = there.get(second, (0, len(trace.t) - 1))
+        row, last = there.get(second, (0, end))
         safe = given.required_m + sum(given.radii_m)
         drawn = own.cover_m if own.drawn and second in there and not passive else 0.0
         needs_start = drawn or (not passive and (own.late or other.late))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.scenario.schema import Decision
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import NormSignal, corner_times, interpolate, travelled
@@ -95,18 +96,10 @@ def transitions(x: NormSignal, zeta: float, release: float, dwell: float) -> Ite
 
 def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
     """First row at which the noise of a UGV is not that of dn = -leak n dt + s dW, by Euler's method over rows."""
-    # It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at
-    # the rate s w / sqrt(h) - leak n.
-    given = trace.scenario.decision
-    t = trace.t
-    n = trace.column(f"{ugv}.noise_m")
+    t, n = trace.t, trace.column(f"{ugv}.noise_m")
     if abs(n[0]) > NOISE_TOLERANCE_M:
         return {"t_s": float(t[0]), "what": "noise: does not start at 0", "noise_m": float(n[0])}
-    dt, h = np.diff(t), given.noise_period_s
-    moved = np.diff(n) + given.leak_1_s * n[:-1] * dt
-    due = dt * _rates(moved, dt, np.floor(0.5 * (t[1:] + t[:-1]) / h))
-    most = LARGEST_SAMPLE * given.noise_m_sqrt_s / np.sqrt(h) * dt
-    off = np.maximum(np.abs(moved - due), np.abs(moved) - most)
+    off = noise_off(t, n[:, None], trace.scenario.decision)[:, 0]
     if not (off > NOISE_TOLERANCE_M).any():
         return None
     k = int(np.argmax(off > NOISE_TOLERANCE_M))
@@ -114,9 +107,21 @@ def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
     return {"t_s": float(t[k + 1]), "what": what, "noise_m": float(n[k + 1]), "off_m": float(off[k])}
 
 
+def noise_off(t: Array, noise: Array, given: Decision) -> Array:
+    """By how much each of n noises, (T, n), m, is off where it should be at each row but the first, (T - 1, n), m."""
+    # It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at
+    # the rate s w / sqrt(h) - leak n.
+    dt, h = np.diff(t), given.noise_period_s
+    lasting = dt[:, None]
+    moved = np.diff(noise, axis=0) + given.leak_1_s * noise[:-1] * lasting
+    due = lasting * _rates(moved, dt, np.floor(0.5 * (t[1:] + t[:-1]) / h))
+    most = LARGEST_SAMPLE * given.noise_m_sqrt_s / np.sqrt(h) * lasting
+    return np.asarray(np.maximum(np.abs(moved - due), np.abs(moved) - most))
+
+
 def _rates(moved: Array, dt: Array, period: Array) -> Array:
-    """moved / dt of the longest step in the same period, for each step, (S,)."""
+    """moved / dt of the longest step in the same period, for each step, (S, n)."""
     _, of = np.unique(period, return_inverse=True)
     order = np.lexsort((dt, of))
     longest = order[np.append(np.diff(of[order]) > 0, True)]
-    return np.asarray((moved[longest] / dt[longest])[of])
+    return np.asarray((moved[longest] / dt[longest, None])[of])

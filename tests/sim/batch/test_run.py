@@ -114,11 +114,13 @@ def test_a_step_over_corners_misses_nothing(
     assert (found[1] <= seen.max(axis=0) + 0.2).all()
 
 
-def test_what_is_left_to_drake() -> None:
+def test_what_is_left_to_drake(capsys: pytest.CaptureFixture[str]) -> None:
     scenario = load("lagging", ["duration_s=1.0"])
     with pytest.raises(LeftToDrakeError, match="the plant of cart1"):
         Batch(scenario, "d")
     assert first_difference(simulate(scenario, "d"), simulate(scenario, "d", engine="batch")) is None
+    said = "note: Drake's Simulator makes run d: the loop leaves it the plant of cart1\n"
+    assert capsys.readouterr().err == said
 
 
 def test_an_engine_that_does_not_exist_is_named() -> None:

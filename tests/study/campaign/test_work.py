@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
-from airground_drake.sim.batch.run import Batch
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.batch import loop
+from airground_drake.sim.batch.loop import Team
+from airground_drake.sim.blocks.controllers import UavController
 from airground_drake.study.campaign import work
-from airground_drake.study.campaign.rows import BATCH, BOTH, COLUMNS, DRAKE, INVALID, JUDGED, STOPPED
+from airground_drake.study.campaign.rows import BATCH, BOTH, COLUMNS, DRAKE, INVALID, JUDGED, SCREENED, STOPPED
 from airground_drake.study.campaign.spec import Spec, load_spec
+from airground_drake.verify import array_judges
 
+CASE_A = Path(__file__).parents[3] / "benchmarks" / "campaigns" / "case_a.yaml"
 TEXT = """
 scenario: minimal
 set: {duration_s: 2.0}
@@ -108,7 +113,7 @@ def test_a_scenario_that_is_made_small_is_simulated_with_code_beside_the_spec(sp
 def test_drake_makes_a_share_of_the_loops_runs_again(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
     quiet = replace(spec, claims=("ZENO-TRACE",))
     monkeypatch.setattr(work, "SHARE", 0.0)
-    assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS)} == {BATCH}
+    assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS)} == {SCREENED}
     assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS, "drake")} == {DRAKE}
     late = replace(quiet, fixed={"ugvs.ugv1.plant": [{"kind": "delay", "delay_s": 0.1}]})
     assert {row["engine"] for row in work.rows_of(late, 5, DEFAULT_LIMITS)} == {DRAKE}
@@ -118,21 +123,72 @@ def test_drake_makes_a_share_of_the_loops_runs_again(spec: Spec, monkeypatch: py
 
 def test_drake_makes_what_fails_again(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(work, "SHARE", 0.0)
-    for expected, engine in ({}, BOTH), ({"LIVE-GOAL": "refuted"}, BATCH):
+    for expected, engine in ({}, BOTH), ({"LIVE-GOAL": "refuted"}, SCREENED), ({"LIVE-GOAL": "nothing"}, SCREENED):
         runs = {"a": {"method": "a", "expected": expected}}
         rows = work.rows_of(replace(spec, claims=("LIVE-GOAL",), fixed={"runs": runs}), 5, DEFAULT_LIMITS)
         assert {(row["status"], row["engine"]) for row in rows} == {("refuted", engine)}
 
 
-def test_one_difference_ends_a_campaign(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = Batch.simulate
+def bug_in_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gain of the UAV's task is off by one unit in the last place."""
+    right = loop.advance
 
-    def wrong(self: Batch, seed: int | None = None) -> Trace:
-        trace = made(self, seed)
-        trace.states.loc[len(trace.states) - 1, "ugv1.x_m"] += 1e-15
-        return trace
+    def wrong(team: Team, *rest: Any) -> int:
+        return right(team._replace(uav=team.uav * (1.0 + 2.0**-52)), *rest)
 
-    monkeypatch.setattr(Batch, "simulate", wrong)
+    monkeypatch.setattr(loop, "advance", wrong)
+
+
+def bug_in_a_leaf_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same of the UAV's speed, in Drake's block."""
+    right = UavController.velocity
+
+    def wrong(self: UavController, *given: Any) -> Array:
+        return right(self, *given) * (1.0 + 2.0**-52)
+
+    monkeypatch.setattr(UavController, "velocity", wrong)
+
+
+def bug_in_an_array_judge(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robots seem 1 um farther apart than they are."""
+    right = array_judges.least_of_pairs
+    monkeypatch.setattr(array_judges, "least_of_pairs", lambda *given: right(*given) + 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("plant", "told"),
+    [
+        (bug_in_the_loop, r"uav.* is .* by Drake and .* by the loop"),
+        (bug_in_a_leaf_system, r"uav.* is .* by Drake and .* by the loop"),
+        (bug_in_an_array_judge, r"SAFE-TRACE is holds, margin .* by the trace and holds, margin .* by the array judge"),
+    ],
+)
+def test_one_difference_ends_a_campaign(
+    plant: Callable[[pytest.MonkeyPatch], None], told: str, spec: Spec, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(work, "SHARE", 1.0)
-    with pytest.raises(work.EnginesDifferError, match=r"ugv1.x_m is .* by Drake and .* by the loop"):
+    plant(monkeypatch)
+    with pytest.raises(work.DifferenceError, match=told):
         work.rows_of(spec, 5, DEFAULT_LIMITS)
+
+
+def test_what_array_judges_cannot_tell_is_judged_by_the_trace(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work, "SHARE", 0.0)
+    assert {row["engine"] for row in work.rows_of(spec, 5, DEFAULT_LIMITS)} == {SCREENED}
+    more = replace(spec, claims=(*spec.claims, "SAFE-HYP"))
+    assert {row["engine"] for row in work.rows_of(more, 5, DEFAULT_LIMITS)} == {BATCH}
+    monkeypatch.setattr(array_judges.ArrayJudges, "findings", lambda *_: {})
+    rows = work.rows_of(spec, 5, DEFAULT_LIMITS)
+    assert {(row["engine"], row["status"]) for row in rows} == {(BATCH, "holds")}
+
+
+def test_a_screened_row_is_that_of_the_judge_of_traces(monkeypatch: pytest.MonkeyPatch) -> None:
+    of_case_a = replace(load_spec(CASE_A), claims=("SAFE-TRACE", "THR-TRIG"), runs=("d",), fixed={"duration_s": 17.0})
+    monkeypatch.setattr(work, "SHARE", 0.0)
+    screened = work.rows_of(of_case_a, 5, DEFAULT_LIMITS)
+    monkeypatch.setattr(work, "SHARE", 1.0)
+    compared = work.rows_of(of_case_a, 5, DEFAULT_LIMITS)
+    assert [row["engine"] for row in (*screened, *compared)] == [SCREENED] * 2 + [BOTH] * 2
+    for ours, theirs in zip(screened, compared, strict=True):
+        for name in COLUMNS.keys() - {"engine", "wall_s"}:
+            assert ours[name] == pytest.approx(theirs[name], abs=1e-8, nan_ok=True), name

@@ -20,6 +20,7 @@ from airground_drake.sim.simulation import simulate
 from airground_drake.ugv import drake_solvers
 from airground_drake.ugv.binary_program import BinaryProgram, block_of_stage
 from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.daqp_solver import Form
 from airground_drake.ugv.drake_solvers import SOLVERS, Minimiser, SolverResult, lacking, relax
 from airground_drake.ugv.problem import Problem
 from airground_drake.ugv.relaxation import normals_along
@@ -62,15 +63,15 @@ def test_the_program_is_the_problem(blocks: int) -> None:
         plan = values[block_of_stage(12, blocks)]
         lacking = problem.distances - np.sum(normals * (problem.positions(plan)[:, None] - problem.centres), axis=2)
         slack = np.maximum(0.0, lacking).max(axis=1)
-        made, every = binary.program, np.zeros(12 + blocks)
-        every[made.FindDecisionVariableIndices(binary.omega)] = values
-        every[made.FindDecisionVariableIndices(binary.u)] = slack
+        made, every = binary.program, np.append(values, slack)
         claimed = sum(float(made.EvalBinding(each, every)[0]) for each in made.GetAllCosts())
         assert claimed == pytest.approx(float(cost(problem, plan, normals)), rel=1e-12)
         assert made.CheckSatisfied(made.GetAllConstraints(), every, 1e-9)
-        assert {omega.get_type() for omega in binary.omega} == {Variable.Type.BINARY}
-        demanded, rows = np.zeros(12), binary.half_planes.evaluator()
-        for row, lower in zip(rows.GetDenseA(), rows.lower_bound(), strict=True):
+        assert {omega.get_type() for omega in made.decision_variables()[:blocks]} == {Variable.Type.BINARY}
+        read = Form.of(made)
+        assert all(np.array_equal(value, getattr(binary.form, name)) for name, value in vars(read).items())
+        demanded = np.zeros(12)
+        for row, lower in zip(read.rows, read.lower, strict=True):
             stage = row[blocks:].argmax()
             demanded[stage] = max(demanded[stage], lower - row[:blocks] @ values)
         np.testing.assert_allclose(demanded, slack, atol=1e-12)  # by the half-planes that are not left out

@@ -1,0 +1,153 @@
+"""Array judges come to what the judge of traces comes to, and pass nothing that is wrong with a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from airground_drake.scenario.load import load
+from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.shipped import shipped_files
+from airground_drake.sim.batch.loop import Log
+from airground_drake.sim.batch.run import Batch, LeftToDrakeError
+from airground_drake.study.campaign.screening import happened, happened_in
+from airground_drake.study.testing.strategies import scenarios
+from airground_drake.verify import judge
+from airground_drake.verify.array_judges import SAME, SCREENED, ArrayJudges, NoScreenError
+
+SHORT = ["duration_s=17.33", "reproduction=[]"]
+
+
+def compared(scenario: Scenario, run: str, seeds: range = range(1)) -> set[str]:
+    """The claims with findings, all of them those of the judge of traces; and the same has happened."""
+    loop, screened = Batch(scenario, run), set[str]()
+    judges = ArrayJudges(loop)
+    for seed in seeds:
+        made = loop.made(seed)
+        findings, trace = judges.findings(made.log), made.trace()
+        for verdict in judge(trace, SCREENED):
+            if (finding := findings.get(verdict.claim.id)) is not None:
+                assert (finding.status, finding.unit) == (verdict.status, verdict.unit), verdict
+                assert finding.exercised == verdict.exercised, verdict
+                assert finding.margin == pytest.approx(verdict.margin, abs=SAME), verdict
+        if findings:
+            assert happened(loop, made) == pytest.approx(happened_in(trace), nan_ok=True)
+        screened |= findings.keys()
+    return screened
+
+
+@pytest.mark.parametrize("run", ["a", "b", "d"])
+def test_findings_are_those_of_the_judge_of_traces(run: str) -> None:
+    """Proposals, a release, robots that slide along an obstacle and one that stalls are among them."""
+    assert compared(load("case_a", SHORT), run, range(2)) == {*SCREENED}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(shipped_files()))
+def test_shipped_scenarios(name: str) -> None:
+    scenario = load(name)
+    for run in scenario.runs:
+        try:
+            compared(scenario, run)
+        except (LeftToDrakeError, NoScreenError):
+            continue
+
+
+@pytest.mark.slow
+@given(scenarios())
+@settings(max_examples=30)
+def test_drawn_scenarios(scenario: Scenario) -> None:
+    for run in scenario.runs:
+        try:
+            compared(scenario, run)
+        except (LeftToDrakeError, NoScreenError):
+            continue
+
+
+@pytest.fixture(scope="module")
+def loop() -> Batch:
+    return Batch(load("case_a", SHORT), "d")
+
+
+@pytest.fixture(scope="module")
+def log(loop: Batch) -> Log:
+    return loop.made().log
+
+
+def moved(log: Log) -> Log:
+    """A robot jumps."""
+    log.bodies[200:, 0] += 1e-6
+    return log
+
+
+def overtaken(log: Log) -> Log:
+    """A robot is taken through an obstacle, as its commands say."""
+    log.bodies[:, 3], log.bodies[:, 4] = 4.0 + 0.5 * (log.t - 8.0), 7.0
+    log.command[:, 3:5] = [0.5, 0.0]
+    return log
+
+
+def late(log: Log) -> Log:
+    """The trigger is isolated 2e-5 s late."""
+    row = int(np.flatnonzero(log.status[:, 0])[0]) - 1
+    by = 2e-5 / (log.t[row + 1] - log.t[row])
+    for column in log[1:]:
+        if column is not log.command and column is not log.status and column is not log.executing:
+            column[row] += by * (column[row + 1] - column[row])
+    log.t[row] += 2e-5
+    log.status[log.status[:, 2] > 0.0, 2] = log.t[row]
+    return log
+
+
+def missed(log: Log) -> Log:
+    """The trigger does not happen."""
+    log.status[:, :4] = log.status[0, :4]
+    return log
+
+
+def other_mode(log: Log) -> Log:
+    log.status[100, 0] = 2.0
+    return log
+
+
+def other_variable(log: Log) -> Log:
+    log.x[100, 0] += 1e-5
+    return log
+
+
+def jump_of_the_noise(log: Log) -> Log:
+    log.noise[100:, 0] += 1e-4
+    log.x[100:, 0] += 1e-4
+    return log
+
+
+def shorter(log: Log) -> Log:
+    return Log(*(column[:-1] for column in log))
+
+
+def hole(log: Log) -> Log:
+    return Log(*(np.delete(column, slice(100, 103), axis=0) for column in log))
+
+
+WRONG: dict[Callable[[Log], Log], str] = {
+    moved: "SAFE-TRACE", overtaken: "SAFE-TRACE", late: "THR-TRIG", missed: "THR-TRIG", other_mode: "THR-TRIG",
+    other_variable: "THR-TRIG", jump_of_the_noise: "THR-TRIG", shorter: "SAFE-TRACE", hole: "THR-TRIG",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", WRONG, ids=[change.__name__ for change in WRONG])
+def test_what_is_wrong_with_a_run_does_not_pass(change: Callable[[Log], Log], loop: Batch, log: Log) -> None:
+    judges = ArrayJudges(loop)
+    assert judges.findings(log)[WRONG[change]].status == "holds"
+    finding = judges.findings(change(Log(*(column.copy() for column in log)))).get(WRONG[change])
+    assert finding is None or finding.status == "refuted"
+
+
+def test_robots_that_are_left_to_the_judge_of_traces() -> None:
+    turns, appears = load("case_a_unicycle"), load("case_a", [*SHORT, "obstacles.obstacle_1.appears_s=2.0"])
+    for scenario, what in (turns, "does not move as it is told"), (appears, "an obstacle that appears"):
+        with pytest.raises(NoScreenError, match=what):
+            ArrayJudges(Batch(scenario, "a"))
