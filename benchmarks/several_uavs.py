@@ -21,7 +21,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
 
 DEFAULT = ("swap", "doorway", "intersection", "crossing", "warehouse", "lab", "pillars")
-APART_M = 1.0
+APART_M = 0.5
 CLAIMS = ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP", "GATE-PLAN")
 
 
