@@ -35,7 +35,7 @@ REALISES = {
     "DecisionVariable": "DDM, (15)",
     "EventTrigger": "threshold, (20)",
     "InterventionPlanner": "proposals, (12)-(14)",
-    "AllProposals": "each UGV's",
+    "AllProposals": "what UAVs ask",
     "MixedIntegerRoute": "MPC, (21)-(26)",
     "RelaxedRoute": "MPC, relaxed, (27)-(29)",
     "NonlinearRoute": "MPC, relaxed, (27)-(29)",
@@ -51,7 +51,7 @@ RECORDED, INK, MUTED = "#0060a8", "#1a1a1a", "#666666"
 # Which blocks fly and which drive. A wire between them is a radio link.
 ABOARD = {
     "decision_noise": "UAV", "decision_variable": "UAV", "event_trigger": "UAV", "intervention_planner": "UAV",
-    "uav_controller": "UAV", "gatekeeper": "UGVs", "ugv_controller": "UGVs",
+    "uav_controller": "UAV", "all_proposals": "UAV", "gatekeeper": "UGVs", "ugv_controller": "UGVs",
 }  # fmt: skip
 LEGEND = "dashed: sent between UAV and UGVs, grey: from the vehicles, blue: recorded"
 WIDTH_IN = 10.9  # maximum width of a picture: that of a landscape page of A4 with margins of 1 cm
