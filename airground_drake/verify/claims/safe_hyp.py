@@ -386,6 +386,7 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     """How many avoidance inequalities were in range of a robot, and how many bound a command, by who avoided whom."""
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
+    count |= {"uav beside uav": 0} if len(trace.uavs) > 1 else {}
     kind_of = trace.scenario.kind_of
     beside = ["obstacle" for _ in parts_of(trace).owner] + [kind_of(robot) for robot in trace.robots]
     in_range = 0
