@@ -17,7 +17,7 @@ NOT_MODELLED = {
     r"latenc|packet|bandwidth|(message|link|communication).*(delay|loss|rate)": "what happens to messages is under "
     "channel",
     r"(sensor|sensing|position|measurement|odometry).*(noise|error|drift)|occlu|field_of_view|fov": "sensing within "
-    "range is perfect",
+    "range misses nothing, and sensing.position_error_m bounds errors of positions",
     r"batter|energy|fuel|power": "energy is not modelled",
     r"wind|weather|slope|terrain": "the ground is flat, and there is no wind",
 }  # fmt: skip

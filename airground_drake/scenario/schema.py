@@ -73,12 +73,13 @@ SHAPES = ("polygon_m", "segment_m", "size_m")
 ABOUT = ("size_m",)
 """Those of them that are about its position, which they need."""
 
+ERRORS: tuple[str, ...] = ("drawn", "adversarial", "away", "sideways")
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
-OPTIONAL: tuple[str, ...] = ("channel", "ugv_controller")
+OPTIONAL: tuple[str, ...] = ("channel", "ugv_controller", "sensing")
 """Sections that a scenario need not have; without them, it is written and digested as if they did not exist."""
 SETTABLE: tuple[str, ...] = ("channel", "decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
@@ -306,6 +307,28 @@ class Control:
     """Gain of tracking an intervention, (14)."""
     sensing_range_m: Positive = 4.0
     """Robots sense nothing beyond it; it covers every safe distance, both radii and a period of closing speed."""
+
+
+@dataclass(slots=True)
+class Sensing:
+    """Measured positions: each robot publishes one, off by a bounded error, and all robots and gatekeepers act on it.
+
+    The law keeps as much more as that costs (`airground budget`), and robots stand where measured inequalities
+    contradict one another. 'drawn' errors change smoothly. 'adversarial' ones are at the bound: the nearest thing looks
+    farther ('away') or is seen in another direction ('sideways'), by turns of half a second. Beside obstacles that may
+    move nothing is promised then, and a scenario with both is refused.
+    """
+
+    position_error_m: NotNegative = 0.0
+    """Largest error of a robot's published position."""
+    errors: Annotated[Words, one_of(ERRORS)] = "drawn"
+    """How they come."""
+    correlation_s: Positive = 1.0
+    """Time after which a drawn error is a new one; in between it is linear."""
+    uav_error_m: NotNegative = 0.0
+    """Largest error of a UGV's position that the UAV plans with, drawn; no distance rests on it."""
+    seed: CountFromZero = 0
+    """Seed of the errors."""
 
 
 @dataclass(slots=True)
@@ -619,6 +642,8 @@ class Scenario:
     """The controllers."""
     ugv_controller: OwnController | None = None
     """A controller of your own, in place of the package's."""
+    sensing: Sensing | None = None
+    """Errors of measured positions."""
     decision: Decision = field(default_factory=Decision)
     """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)
@@ -647,6 +672,11 @@ class Scenario:
         """SHA-256 of the scenario as nested dicts and lists in strict JSON, with all defaults and without spaces."""
         text = json.dumps(self.data(), separators=(",", ":"), allow_nan=False)
         return sha256(text.encode())
+
+    @property
+    def position_error_m(self) -> float:
+        """Bound of the error of a robot's published position, m; 0 without errors."""
+        return self.sensing.position_error_m if self.sensing else 0.0
 
     @property
     def barriers(self) -> dict[str, Obstacle]:

@@ -42,15 +42,17 @@ from airground_drake.sim.blocks import (
 )
 from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvController
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
+from airground_drake.sim.blocks.sensing import Errors, PositionSensing
 
 # Exported output ports of the diagram: the signals of a trace.
 RECORDED = (
     "bodies", "team_command", "reference", "noise", "decision_variable", "status", "executing",
 )  # fmt: skip
 # Further exported output ports: of robots that are not where the law steers them, of users' plants that have a heading,
-# and of unicycles.
-OF_PLANTS = ("plant_signals", "own_headings", "command_share")
+# of unicycles, and of measured positions.
+OF_SOME = ("plant_signals", "own_headings", "command_share", "published", "seen_by_uav")
 
+NO_NAMES: Mapping[str, str] = MappingProxyType({})
 NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
 
 # Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
@@ -160,10 +162,12 @@ def build_model(
     own = scenario.ugv_controller
     ugvs = OwnUgvController(own, world, law, ugv_controller) if own else UgvController(world, law)
     uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
+    # input ports of the parts for which `bodies` are positions as measured
+    measured = {"bodies": "published"} if scenario.sensing else {}
     parts = {
         "decision_making": decision,
-        "task_planning": _task_planning(presets, planners, ugvs, uavs),
-        "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers),
+        "task_planning": _task_planning(presets, planners, ugvs, uavs, measured),
+        "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers, renamed={answering: measured}),
         "vehicles": vehicles,
     }
     links = None
@@ -172,12 +176,14 @@ def build_model(
         (planner,) = plans.values()
         links = Downlink(down, planner.start(), period, retry), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}
+    if scenario.sensing:
+        parts["sensing"] = PositionSensing(Errors(scenario.sensing, world), world)
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
     if isinstance(ugvs, OwnUgvController):
         ugvs.require_inputs(named)
-    recorded = (*RECORDED, *(name for name in OF_PLANTS if name in named))
+    recorded = (*RECORDED, *(name for name in OF_SOME if name in named))
     exported = [*recorded, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
     return Model(
@@ -235,6 +241,7 @@ def _task_planning(
     planners: Mapping[str, InterventionPlanner],
     ugvs: UgvController | OwnUgvController,
     uavs: Mapping[str, UavController],
+    measured: Mapping[str, str],
 ) -> Diagram:
     """The task planning layer: preset trajectories, planners, controllers."""
     times, places = components.stack_presets(list(presets))
@@ -253,7 +260,9 @@ def _task_planning(
         "gains": ugvs.GetOutputPort("gains"),
         "uav_command": uav.GetOutputPort("command"),
     }
-    return _assembled("task_planning", systems, named)
+    renamed: dict[System, Mapping[str, str]] = dict.fromkeys([ugvs, *uavs.values()], measured)
+    renamed |= dict.fromkeys(planners.values(), dict.fromkeys(measured, "seen_by_uav"))
+    return _assembled("task_planning", systems, named, renamed=renamed)
 
 
 def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:
@@ -314,9 +323,11 @@ def _assembled(
     named: Mapping[str, OutputPort],
     exported: Iterable[str] | None = None,
     wires: Iterable[tuple[OutputPort, InputPort]] = (),
+    renamed: Mapping[System, Mapping[str, str]] = MappingProxyType({}),
 ) -> Diagram:
     """A Diagram of systems by name, in which input ports are fed by name."""
     # exported: which of `named` become output ports of the diagram; default: all.
+    # renamed: of some systems, what feeds an input port of a name.
     builder = DiagramBuilder()
     for key, system in systems.items():
         builder.AddNamedSystem(key, system)
@@ -324,7 +335,7 @@ def _assembled(
         builder.Connect(source, target)
     inputs = set()
     for port in (system.get_input_port(i) for system in systems.values() for i in range(system.num_input_ports())):
-        wanted = port.get_name()
+        wanted = renamed.get(port.get_system(), NO_NAMES).get(port.get_name(), port.get_name())
         if builder.IsConnectedOrExported(port):
             continue
         if wanted in named:
@@ -362,12 +373,15 @@ def make_monitor(
 
     Raises:
         ScenarioError, UnknownNameError, PluginError: as `build_diagram`; also if the UGVs have a controller of the
-            user's: no law is known that it must obey.
+            user's, whose law is not known, or act on measured positions, which a monitor does not see.
     """
     scenario = validated(scenario)
     if scenario.ugv_controller is not None:
         told = f"ugv_controller {scenario.ugv_controller.kind!r} has no law that is known here"
         raise PluginError(f"{told}; allowed for a monitor: a scenario without one")
+    if scenario.sensing is not None:
+        told = f"sensing of scenario {scenario.name!r} has errors, and a monitor sees true positions"
+        raise PluginError(f"{told}; allowed: a scenario without sensing")
     chosen, composition = _chosen(scenario, method, composition)
     world = make_world(scenario)
     ugvs = UgvController(world, components.make_law(scenario, chosen, composition))

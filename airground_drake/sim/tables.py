@@ -123,7 +123,7 @@ SEEN_COLUMNS = {
     "measured_s": "float64",
 }  # fmt: skip
 """Columns of `Trace.seen`: where a robot saw a body at a control sample, if not at its true place of that instant, and
-when it measured that. Simulated robots see true places: the table is empty."""
+when it measured that. For simulated robots the table is empty: see `samples` for what they publish of positions."""
 
 TABLES = ("states", "samples", "seen", "messages", "proposals", "plans", "decisions", "problems")
 """Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""

@@ -7,6 +7,7 @@ from airground_drake.sim.blocks.gatekeeper import DirectAcceptance, Gatekeeper
 from airground_drake.sim.blocks.intervention import InterventionPlanner
 from airground_drake.sim.blocks.monitor import Laws, Monitor, Rule, Violation
 from airground_drake.sim.blocks.plant import VelocityDisturbance
+from airground_drake.sim.blocks.sensing import PositionSensing
 
 __all__ = [
     "DecisionBlock",
@@ -18,6 +19,7 @@ __all__ = [
     "InterventionPlanner",
     "Laws",
     "Monitor",
+    "PositionSensing",
     "Rule",
     "UavController",
     "UgvController",

@@ -184,7 +184,7 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
     """(26b)-(26e), (25) and what was recorded about the plan."""
     limit = trace.scenario.ugvs[row.robot].max_speed_m_s
     period = trace.scenario.control.period_s
-    begins = row["initial_m"] - interpolate(trace.t, trace.position(row.robot), row.t_s)
+    begins = row["initial_m"] - _seen_at(trace, row)
     yield Deviation(row, "initial position, m", begins, POSITION_TOLERANCE_M)
     refusing, accepting = row.constant
     clear_refusing, clear_accepting = (_clear(trace, row, way, period) for way in (refusing, accepting))
@@ -221,6 +221,15 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
         step = np.linalg.norm(np.diff(positions, axis=0, prepend=row["initial_m"][None]), axis=1)
         over = (step / (limit * row.dt) - 1.0)[clear]
         yield Deviation(row, f"{name}: faster than the speed limit", np.maximum(0.0, over), SPEED_TOLERANCE)
+
+
+def _seen_at(trace: Trace, row: DecisionRecord) -> Array:
+    """Where a UGV saw itself when it decided, (3,), m."""
+    if trace.scenario.sensing is None:
+        return interpolate(trace.t, trace.position(row.robot), row.t_s)
+    sample = int(np.searchsorted(trace.sampled("t_s"), row.t_s - TIME_TOLERANCE_S))
+    seen: Array = trace.as_seen(row.robot, row.robot)[sample]
+    return seen
 
 
 def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -> npt.NDArray[np.bool_]:
