@@ -25,9 +25,11 @@ from airground_drake.base.registry import (
     UGV_CONTROLLERS,
 )
 from airground_drake.base.values import (
+    Chance,
     Count,
     CountFromZero,
     Heading,
+    Loss,
     Name,
     NotNegative,
     Positive,
@@ -77,9 +79,9 @@ AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
-OPTIONAL: tuple[str, ...] = ("ugv_controller", "sensing")
+OPTIONAL: tuple[str, ...] = ("channel", "ugv_controller", "sensing")
 """Sections that a scenario need not have; without them, it is written and digested as if they did not exist."""
-SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
+SETTABLE: tuple[str, ...] = ("channel", "decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
 
@@ -474,6 +476,51 @@ class Gatekeeper:
 
 
 @dataclass(slots=True)
+class WayBack:
+    """The way from UGVs to the UAV where it differs from the way there: what is left out is as there."""
+
+    delay_s: NotNegative | None = None
+    """How late every message is."""
+    jitter_s: NotNegative | None = None
+    """By how much more a message may be late, uniformly."""
+    loss: Loss | None = None
+    """Share of messages that are lost."""
+    burst_s: NotNegative | None = None
+    """Mean duration of a loss; 0: each message is lost for itself."""
+    duplicate: Chance | None = None
+    """Share of messages that arrive twice."""
+    reorder: YesNo | None = None
+    """Whether a message may overtake another one."""
+
+
+@dataclass(slots=True)
+class Channel:
+    """What happens to messages between UAV and UGVs. Without it they arrive at once, and none is lost.
+
+    The fate of a message depends on `seed`, its link, its number and how often it was sent before, and on nothing else:
+    with another delay the same messages are lost. Who waits for an answer repeats the message after twice the delay,
+    the jitter and 0.15 s. Robots see each other as they are: distances do not depend on messages.
+    """
+
+    delay_s: NotNegative = 0.0
+    """How late every message is."""
+    jitter_s: NotNegative = 0.0
+    """By how much more a message may be late, uniformly."""
+    loss: Loss = 0.0
+    """Share of messages that are lost."""
+    burst_s: NotNegative = 0.0
+    """Mean duration of a loss; 0: each message is lost for itself."""
+    duplicate: Chance = 0.0
+    """Share of messages that arrive twice."""
+    reorder: YesNo = True
+    """Whether a message may overtake another one."""
+    seed: CountFromZero = 1
+    """Decides which messages are lost, doubled and late."""
+    up: WayBack | None = None
+    """The way back, from UGVs to the UAV; by default it is as the way there."""
+
+
+@dataclass(slots=True)
 class Run:
     """One simulation: a method (see `airground list methods`) and what is expected of it.
 
@@ -603,6 +650,8 @@ class Scenario:
     """The UAV's intervention behaviours."""
     gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
     """The UGVs' decisions about proposals."""
+    channel: Channel | None = None
+    """What happens to messages; by default they arrive at once."""
     runs: Annotated[dict[Name, Run], Field(min_length=1)] = field(kw_only=True)
     """The simulations, by name."""
     claims: Annotated[dict[Words, Words], CLAIMS] = field(default_factory=dict)

@@ -467,9 +467,7 @@ def _clearances(scenario: Scenario) -> Problems:
 
 
 def _too_near(robot: _Round, attribute: str, what: str, kind: str, least: float) -> tuple[str, object, str]:
-    message = f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
-    message = f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
-    return f"{robot.key}.{attribute}", robot.point, message
+    return f"{robot.key}.{attribute}", robot.point, f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
 
 
 def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -> Iterator[tuple[_Round, _Round]]:

@@ -29,6 +29,7 @@ from airground_drake.sim import components
 from airground_drake.sim.blocks import (
     DecisionVariable,
     DirectAcceptance,
+    Downlink,
     EventTrigger,
     Gatekeeper,
     InterventionPlanner,
@@ -36,6 +37,7 @@ from airground_drake.sim.blocks import (
     Monitor,
     UavController,
     UgvController,
+    Uplink,
     VelocityDisturbance,
 )
 from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvController
@@ -72,6 +74,8 @@ class Model:
     controllers: tuple[UgvController | OwnUgvController | UavController, ...]  # of the UGVs, and of each UAV
     signals: tuple[str, ...]  # names of the columns of `plant_signals` and `own_headings`
     recorded: tuple[str, ...]  # names of the exported output ports that are the signals of a trace
+    links: tuple[Downlink, Uplink] | None = None  # the channel
+    answering: Gatekeeper | DirectAcceptance | None = None  # the UGVs on it
 
 
 def build_diagram(
@@ -142,16 +146,19 @@ def build_model(
     made = {body.name: plant_system(body, scenario.control.period_s, plants) for body in world.moving}
     signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))
     vehicles = _vehicles(world, made, disturbed=disturbed)
+    channel, period = scenario.channel if chosen.intervenes else None, scenario.control.period_s
+    plans = {uav: components.make_planner(scenario, chosen, uav) for uav in scenario.aerial}
     planners = {
-        uav: InterventionPlanner(components.make_planner(scenario, chosen, uav), world, scenario.control.period_s)
-        for uav in scenario.aerial
+        uav: InterventionPlanner(planner, world, period, channel=channel is not None) for uav, planner in plans.items()
     }
-    gatekeeper = None
+    gatekeeper, retry = None, components.repeats_after(scenario)
     if chosen.gated:
-        periods = {"period": scenario.gatekeeper.period_s, "control": scenario.control.period_s}
-        gatekeeper = Gatekeeper(make_gatekeepers(scenario, law), world, **periods)
-    answering = DirectAcceptance(n) if gatekeeper is None else gatekeeper
-    answers = {name: answering.GetOutputPort(name) for name in ("answers", "reports")}
+        gatekeeper = Gatekeeper(
+            make_gatekeepers(scenario, law), world, period=scenario.gatekeeper.period_s, control=period,
+            retry=retry if channel else None,
+        )  # fmt: skip
+    answering = gatekeeper or DirectAcceptance(n, channel_period=period if channel else None)
+    answers = {port.get_name(): port for port in _outputs(answering) if not (channel and port.get_name() == "reports")}
     own = scenario.ugv_controller
     ugvs = OwnUgvController(own, world, law, ugv_controller) if own else UgvController(world, law)
     uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
@@ -163,6 +170,12 @@ def build_model(
         "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers, renamed={answering: measured}),
         "vehicles": vehicles,
     }
+    links = None
+    if channel:
+        down, up = components.make_links(channel)
+        (planner,) = plans.values()
+        links = Downlink(down, planner.start(), period, retry), Uplink(up, period)
+        parts |= {"downlink": links[0], "uplink": links[1]}
     if scenario.sensing:
         parts["sensing"] = PositionSensing(Errors(scenario.sensing, world), world)
     if monitor is not None:
@@ -183,6 +196,8 @@ def build_model(
         controllers=(ugvs, *uavs.values()),
         signals=signals,
         recorded=recorded,
+        links=links,
+        answering=answering,
     )
 
 
@@ -238,7 +253,7 @@ def _task_planning(
     (planner,), (uav,) = planners.values(), uavs.values()
     named = {
         "reference": reference.get_output_port(),
-        "proposals": planner.GetOutputPort("proposals"),
+        **{port.get_name(): port for port in _outputs(planner)},
         "ugv_command": ugvs.GetOutputPort("command"),
         "executing": ugvs.GetOutputPort("executing"),
         **({"command_share": ugvs.GetOutputPort("command_share")} if ugvs.HasOutputPort("command_share") else {}),

@@ -1,5 +1,6 @@
 """LeafSystems: thin shells that give the pure maths named ports, rates and state."""
 
+from airground_drake.sim.blocks.channel import Downlink, Uplink
 from airground_drake.sim.blocks.controllers import UavController, UgvController
 from airground_drake.sim.blocks.decision import DecisionBlock, DecisionVariable, EventTrigger
 from airground_drake.sim.blocks.gatekeeper import DirectAcceptance, Gatekeeper
@@ -12,6 +13,7 @@ __all__ = [
     "DecisionBlock",
     "DecisionVariable",
     "DirectAcceptance",
+    "Downlink",
     "EventTrigger",
     "Gatekeeper",
     "InterventionPlanner",
@@ -21,6 +23,7 @@ __all__ = [
     "Rule",
     "UavController",
     "UgvController",
+    "Uplink",
     "VelocityDisturbance",
     "Violation",
 ]
