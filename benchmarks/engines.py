@@ -7,8 +7,6 @@ Both are set up once and take turns, seed by seed, in one process with one threa
 first seed, in which compiled functions are loaded, is not timed. Of a run that the loop leaves to Drake it says why.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import time

@@ -8,8 +8,6 @@ exists already; its time excludes the periods up to the first request. A new cou
 CPU, of one process with one thread.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import time

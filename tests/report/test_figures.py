@@ -1,7 +1,5 @@
 """Figures: panels, tables, labels, SVG for a page."""
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable

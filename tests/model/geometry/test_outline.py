@@ -1,7 +1,5 @@
 """Outlines as rows of numbers, and which of them are near: against distances in numpy and by counting."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

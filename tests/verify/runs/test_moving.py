@@ -1,7 +1,5 @@
 """Claims beside obstacles that move: whose doing it was, which distances are promised, and what was declared."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """THR-CHOICE."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
