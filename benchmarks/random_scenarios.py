@@ -275,6 +275,8 @@ def _plants(number: int, count: int, h: float, speed: float) -> tuple[list[list[
         if cars.random() < 0.3:
             steers = {"wheelbase_m": 0.2, "max_steering_rad": float(cars.uniform(0.2, 1.4))}
             drive = {"kind": "ackermann", **turned, **steers}
+        elif cars.random() < 0.3:
+            drive["backwards"] = False
         found.append([*kinds, [drive], [drive]][rng.integers(6)] if some else kinds[0])
     found.append(kinds[rng.integers(4)] if some else kinds[0])
     return found, some * 2.0 * max(1.2 * hand, 2.0 * speed * (lag + late))

@@ -16,6 +16,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError, described
 from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outcome
+from airground_drake.model.bodies import motion
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.finding import Chart, Evidence, Failure, Finding
@@ -330,21 +331,8 @@ def require_body(trace: Trace, robot: str) -> None:
 
 def followed(trace: Trace, robot: str) -> Array:
     """The signals of a body that follows the recorded commands from rest, (T, k)."""
-    plant = trace.plant(robot)
-    period = trace.scenario.control.period_s
-    t = trace.t
-    steered = trace.position(robot)
-    command = trace.command(robot)
-    samples = {*trace.sample_rows.tolist()}
-    memory, since = plant.memory(), t[0]
-    signals = [plant.at(memory, steered[0], command[0], 0.0)]
-    for row in range(1, len(t)):
-        elapsed = float(t[row] - since)
-        elapsed = period if abs(elapsed - period) <= TIME_TOLERANCE_S else elapsed
-        signals.append(plant.at(memory, steered[row], command[row], elapsed))
-        if row in samples:
-            memory, since = plant.remembered(memory, command[row], elapsed), t[row]
-    return np.array(signals)
+    samples, period = {*trace.sample_rows.tolist()}, trace.scenario.control.period_s
+    return motion.followed(trace.plant(robot), trace.t, trace.position(robot), trace.command(robot), samples, period)
 
 
 def _begins(trace: Trace, robot: str) -> None:

@@ -62,7 +62,8 @@ def beginning(trace: Trace, t: float, number: int) -> Beginning:
     still, law = known_cores(trace, row, on)
     pairs = [pair for pair in _among_robots(trace) if robot in (pair.first, pair.second)]
     others = [_other(trace, robot, t, after, pair, asked) for pair in pairs]
-    settled = max(until, arrives, t + gate.horizon_s, *(end for _, _, _, end in others))
+    known = [mover.ends for mover in movers(trace, robot, t, after)]
+    settled = max(until, arrives, t + gate.horizon_s, *(end for _, _, _, end in others), *known)
     law = np.concatenate([law, np.array([(each[1], each[2], 0.0) for each in others]).reshape(-1, 3).T], axis=1)
 
     def loop(choice: int, periods: int) -> Scene:
@@ -116,11 +117,15 @@ def scene(
 
 
 class Mover(NamedTuple):
-    """A part of what moves: its pair, its core about the origin, (1,), and the places of the origin, (S + 1, 3), m."""
+    """A part of what moves: its pair, its core about the origin, (1,), and the places of the origin, (S + 1, 3), m.
+
+    `ends`: when a known motion is over, s; -inf for another one.
+    """
 
     pair: Pair
     core: Cores
     places: Array
+    ends: float
 
 
 def movers(trace: Trace, ugv: str, t: float, after: Array) -> list[Mover]:
@@ -136,13 +141,13 @@ def movers(trace: Trace, ugv: str, t: float, after: Array) -> list[Mover]:
             continue
         way, own = trace.position(name), cores_of(trace)[name]
         velocity = (way[row + 1] - way[row]) / (trace.t[row + 1] - trace.t[row])
-        places = way[row] + np.minimum(after, gate.horizon_s)[:, None] * velocity
+        places, ends = way[row] + np.minimum(after, gate.horizon_s)[:, None] * velocity, -np.inf
         if barrier.known_motion and trace.meta["method"] not in ON_TOP:
             script = course(barrier.moves, trace.scenario.control.period_s, trace.scenario.duration_s)
-            places = interpolate(script.times, script.positions, t + after)
+            places, ends = interpolate(script.times, script.positions, t + after), float(script.times[-1])
         near = np.flatnonzero(away_from(own, here[row] - way[row], planar=True).distance <= reach)
         pair = pairs_beside(trace, ugv)[name]
-        found += [Mover(pair, own.take(slice(k, k + 1)), places) for k in near.tolist()]
+        found += [Mover(pair, own.take(slice(k, k + 1)), places, ends) for k in near.tolist()]
     return found
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.plants.plant import Plant
 
 SAME_S = 1e-9  # times closer than this are one instant, s
 
@@ -40,3 +42,17 @@ class PeriodMotion(NamedTuple):
         share = np.clip(np.divide(along, squared, out=np.zeros_like(squared), where=squared > 0.0), 0.0, 1.0)
         distance = np.linalg.norm(self.start + share[..., None] * change, axis=-1)
         return (np.maximum(distance - self.off_m, 0.0) if self.off_m else distance), share
+
+
+def followed(plant: Plant, t_s: Array, base: Array, command: Array, samples: Collection[int], period_s: float) -> Array:
+    """The signals of a body at T rows, (T, k), that follows commands from rest, as the block of Drake has it."""
+    # base: (T, 3), m; command: in force up to each row, (T, 3), m/s; samples: rows at which another one is chosen
+    memory, since = plant.memory(), t_s[0]
+    signals = [plant.at(memory, base[0], command[0], 0.0)]
+    for row in range(1, len(t_s)):
+        elapsed = float(t_s[row] - since)
+        elapsed = period_s if abs(elapsed - period_s) <= SAME_S else elapsed
+        signals.append(plant.at(memory, base[row], command[row], elapsed))
+        if row in samples:
+            memory, since = plant.remembered(memory, command[row], elapsed), t_s[row]
+    return np.array(signals)

@@ -38,6 +38,7 @@ Bools = npt.NDArray[np.bool_]
 
 # What is due at a tick, as bits.
 CONTROL, PLAN, GATE, NOISE = 1, 2, 4, 8
+WATCH = 16  # what is around changes
 # Why the loop stops: the end; an update for Python; no room for another row; as in Drake, an error.
 DONE, PYTHON, FULL, NOT_A_NUMBER, SHORT_STEPS, NOT_FINITE = 0, 1, 2, 3, 4, 5
 # How it is entered: at the beginning of a run, to go on with it, or to publish a row for which there was no room.
@@ -67,7 +68,6 @@ class Team(NamedTuple):
     draws: Array  # the noise, (.., n)
     gated: bool  # whether UGVs judge proposals
     remembers: bool  # whether they remember what they sensed
-    watchful: bool  # whether what is around changes: then Python looks at every control sample
 
 
 class Around(NamedTuple):
@@ -167,7 +167,7 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
     # At that time the row is published, and the updates of the instant are still to be made.
     # Reading an array of a tuple counts references: once, here.
     law, layer, uav_task, steering, turns, levels, corners, breaks, holds = team[:9]
-    script_of, script_breaks, script_holds, room, numbers, ticks, due, draws, gated, remembers, watchful = team[9:]
+    script_of, script_breaks, script_holds, room, numbers, ticks, due, draws, gated, remembers = team[9:]
     period, shortest, isolation, gain, leak, sensing = numbers
     ugvs, uav = around
     on, number, chosen, row_of, motion_t, motion_p, motion_v = accepted
@@ -215,7 +215,7 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
                 break
         ended = True
         if not resumed:  # unrestricted updates
-            awake = watchful and mask & CONTROL != 0
+            awake = mask & WATCH != 0
             if mask & PLAN:
                 awake = awake or t >= time[3]
                 for j in range(n):

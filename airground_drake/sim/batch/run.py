@@ -13,9 +13,12 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import SimulationError, described
 from airground_drake.base.registry import UAV_TASKS, method_of
+from airground_drake.model.bodies.motion import SAME_S, followed
 from airground_drake.model.law.task import Task
 from airground_drake.model.law.tasks import FormationTask
+from airground_drake.model.plants.delay import Delay
 from airground_drake.model.plants.first_order import FirstOrder
+from airground_drake.model.plants.lag import Lag
 from airground_drake.model.plants.scripted import Scripted
 from airground_drake.model.plants.steering import NUMBERS
 from airground_drake.model.plants.unicycle import Unicycle
@@ -62,7 +65,7 @@ class Batch:
         self.world = world = make_world(given)
         n, r = len(world.names("ugv")), len(world.robots)
         for body in world.moving:
-            if not isinstance(body.plant, FirstOrder | Unicycle | Scripted):
+            if not isinstance(body.plant, FirstOrder | Unicycle | Lag | Delay | Scripted):
                 raise LeftToDrakeError(f"the plant of {body.name}")
         (flown_by, uav), *more = given.aerial.items()
         if more:
@@ -83,7 +86,10 @@ class Batch:
         scripts = [vertices_of(body) for body in world.moving[r:]]
         gated, steering = self.gatekeepers is not None, world.steering
         periods = ((loop.PLAN, self.planner.period), *([(loop.GATE, given.gatekeeper.period_s)] if gated else []))
-        ticks, due = _schedule(scenario.duration_s, control.period_s, noise.noise_period_s, periods)
+        changes = tuple(
+            time for body in world.bodies for time in (body.appears_s, body.disappears_s) if 0.0 < time < np.inf
+        )
+        ticks, due = _schedule(scenario.duration_s, control.period_s, noise.noise_period_s, periods, changes)
         shortest = min(control.period_s, noise.noise_period_s)
         self.draws = int(scenario.duration_s / noise.noise_period_s) + 2
         self.team = Team(
@@ -109,7 +115,6 @@ class Batch:
             draws=np.zeros((0, n)),
             gated=gated,
             remembers=gated and not self.law.intervention_on_top,
-            watchful=any(body.appears_s > 0.0 or body.disappears_s < np.inf for body in world.bodies),
         )  # fmt: skip
         self.headings = np.array([
             body.plant.heading_rad if isinstance(body.plant, Unicycle) else 0.0 for body in world.bodies[:n]
@@ -270,8 +275,10 @@ class Going:
             "bodies": log.bodies, "team_command": log.command, "reference": log.reference, "noise": log.noise,
             "decision_variable": log.x, "status": log.status, "executing": log.executing,
         }  # fmt: skip
+        if batch.world.signals:
+            logged |= {"plant_signals": self._signals(log)}
         if self._team.turns:
-            logged |= {"plant_signals": log.signals, "command_share": log.share}
+            logged |= {"command_share": log.share}
         done = Done(
             t=log.t,
             logged={name: rows.T for name, rows in logged.items()},
@@ -284,10 +291,24 @@ class Going:
         )
         return trace_of(batch.scenario, batch.name, batch.world, done, batch.world.signals)
 
+    def _signals(self, log: Log) -> Array:
+        """What plants record, (T, k): of unicycles by the loop; all others do not act on the run, and follow now."""
+        batch, turning = self._batch, iter(np.split(log.signals, log.signals.shape[1] // loop.SIGNALS or 1, axis=1))
+        ticks = self._team.ticks[(self._team.due & loop.CONTROL) > 0]
+        samples = np.searchsorted(log.t, ticks[ticks <= log.t[-1]], side="right") - 1
+        return np.concatenate([
+            next(turning) if isinstance(body.plant, Unicycle)
+            else followed(
+                body.plant, log.t, log.bodies[:, 3 * i : 3 * i + 3], log.command[:, 3 * i : 3 * i + 3],
+                {*samples.tolist()}, batch.given.control.period_s,
+            )
+            for i, body in enumerate(batch.world.bodies[: len(batch.world.robots)]) if body.plant and body.plant.signals
+        ], axis=1)  # fmt: skip
+
     def _update(self) -> None:
         """Make the updates of an instant by planner and gatekeepers, which see what both remembered before."""
         batch, state, t = self._batch, self._state, self.t
-        if self._team.watchful:
+        if state.counts[3] & loop.WATCH:
             self._around = Around(*(batch.world.at(near, t) for near in batch.near))
         try:
             ahead, self._ahead = self._ahead, None
@@ -346,7 +367,11 @@ class Going:
 
 @lru_cache(maxsize=8)
 def _schedule(
-    duration_s: float, control_s: float, noise_s: float, periods: tuple[tuple[int, float], ...]
+    duration_s: float,
+    control_s: float,
+    noise_s: float,
+    periods: tuple[tuple[int, float], ...],
+    changes: tuple[float, ...],
 ) -> tuple[Array, loop.Ints]:
     """Times of all timed events, s, and what is due then: with Drake's own arithmetic, k times the period."""
     found: dict[float, int] = {}
@@ -358,6 +383,10 @@ def _schedule(
         for k in range(int(duration_s / ticks.period) + 2):
             t = k * ticks.period
             found[t] = found.get(t, 0) | (bit if ticks.due(t) else 0)
+    samples = [k * control_s for k in range(int(duration_s / control_s) + 2)]
+    for time_s in (0.0, *changes) if changes else ():
+        for sample in [t for t in samples if t + SAME_S >= time_s][:1]:
+            found[sample] |= loop.WATCH
     times = sorted(found)
     return np.array(times), np.array([found[t] for t in times], dtype=np.int64)  # nothing writes to them
 

@@ -114,7 +114,7 @@ def test_drake_makes_a_share_of_the_loops_runs_again(spec: Spec, monkeypatch: py
     assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS)} == {SCREENED}
     assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS, "drake")} == {DRAKE}
     late = replace(quiet, fixed={"ugvs.ugv1.plant": [{"kind": "delay", "delay_s": 0.1}]})
-    assert {row["engine"] for row in work.rows_of(late, 5, DEFAULT_LIMITS)} == {DRAKE}
+    assert {row["engine"] for row in work.rows_of(late, 5, DEFAULT_LIMITS)} == {BATCH}
     monkeypatch.setattr(work, "SHARE", 1.0)
     assert {row["engine"] for row in work.rows_of(quiet, 5, DEFAULT_LIMITS)} == {BOTH}
 
