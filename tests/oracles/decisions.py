@@ -150,7 +150,7 @@ def _beside(trace: Trace, row: DecisionRecord, after: Array) -> Iterator[_Beside
         yield _Beside(name, _nearest(core, refused), pairs[name].law_m, core)
     for pair, places in zip(there.robots, there.places, strict=True):
         yield _Beside(pair.second if pair.first == row.robot else pair.first, places, pair.law_m, Cores.at(places))
-    for pair, core, places in movers(trace, row.robot, row.t_s, after):
+    for pair, core, places, _ in movers(trace, row.robot, row.t_s, after):
         moved = Cores(core.corners + places[:, None, :2], core.base + places[:, 2], core.top + places[:, 2])
         yield _Beside(pair.second, _nearest(moved, refused), pair.law_m, moved)
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.compiling import njit
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.paths import NoPath, Path, shortest_path
 from airground_drake.uav.coordination.intervals import Grid, Indices
@@ -97,8 +98,12 @@ class Roadmap:
 
     def distances_to(self, targets: Indices) -> Array:
         """Length of the shortest way from every node to the nearest target node, (N,), m; infinite without a way."""
-        graph = csr_array((self.lengths, self.heads, self.first_edge), shape=(len(self.nodes),) * 2)
-        return np.asarray(dijkstra(graph, indices=targets, min_only=True))
+        return np.asarray(dijkstra(self._graph, indices=targets, min_only=True))
+
+    @cached_property
+    def _graph(self) -> csr_array:
+        rows = self.first_edge.astype(np.int32), self.heads.astype(np.int32)
+        return csr_array((self.lengths, rows[1], rows[0]), shape=(len(self.nodes),) * 2)
 
     def within(self, space: Space, own: RobotNodes) -> Roadmap:
         """This roadmap with only those edges that a larger robot can use."""
@@ -129,30 +134,35 @@ def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: S
     pitch = max(PITCH * space.apart, math.sqrt(float(np.prod(high - low)) / MOST_NODES))
     reach = REACH * pitch
     far = FAR * math.sqrt(space.wide(reach) ** 2 - space.apart**2)
-    lattice, pairs = _lattice(space, low, high, pitch)
+    lattice, number = _lattice(space, low, high, pitch)
     nodes, robots = [lattice], []
     for own, task, path in zip(spaces, tasks, paths, strict=True):
         places, robot = _robot_nodes(own, task, path, sum(map(len, nodes)), pitch, far)
         nodes.append(places)
         robots.append(robot)
     points = np.concatenate(nodes)
-    radii = np.full(len(points) - len(lattice), reach)
-    radii[np.array([[robot.start, robot.target] for robot in robots]) - len(lattice)] = max(far, reach)
-    pairs = np.concatenate([pairs, _other_edges(points, radii)])
-    pairs = pairs[~_is_short_cut(points, pairs, robots)]
-    shut = np.concatenate([robot.preset[~robot.usable] for robot in robots])
-    pairs = pairs[~np.isin(pairs, shut).any(axis=1)]
+    radii, shut = np.full(len(points) - len(lattice), reach), np.zeros(len(points), dtype=bool)
+    partner = np.full(len(points), -1)  # of starts and targets; other robots may be too near at both ends
+    for robot in robots:
+        ends = [robot.start, robot.target]
+        radii[np.array(ends) - len(lattice)] = max(far, reach)
+        shut[robot.preset[~robot.usable]] = True
+        if np.hypot(*(points[robot.start] - points[robot.target])) > ROUNDING_M:
+            partner[ends] = ends[::-1]
+    grid = _grid(points, low, reach)
+    pairs = _pairs(grid, number, radii, partner, shut)
     pairs = pairs[space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])]
-    return Roadmap(_grid(points, low, reach), *_in_rows(points, pairs), reach, tuple(robots))
+    first, heads, lengths = _in_rows(points, pairs)
+    return Roadmap(grid, first, heads, lengths, reach, tuple(robots))
 
 
 def _lattice(space: Space, low: Array, high: Array, pitch: float) -> tuple[Array, Indices]:
-    """Free nodes of a square lattice in a box, (N, 2), m, and pairs of neighbours, (E, 2)."""
+    """Free nodes of a square lattice in a box, (N, 2), m, and their numbers by column and row; -1: no node."""
     columns, rows = (math.ceil(length / pitch) + 1 for length in high - low)
     x, y = np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
     points = low + pitch * np.column_stack([x.ravel(), y.ravel()])
     free = space.points_are_free(points, space.clearance)
-    return points[free], _lattice_edges(np.where(free, np.cumsum(free) - 1, -1).reshape(columns, rows))
+    return points[free], np.where(free, np.cumsum(free) - 1, -1).reshape(columns, rows)
 
 
 def _robot_nodes(
@@ -232,34 +242,47 @@ def _path_nodes(space: Space, path: Path, pitch: float) -> Array:
     return np.array([path.at(s)[0] for s in along[1:]]).reshape(-1, 2)
 
 
-def _lattice_edges(number: npt.NDArray[np.intp]) -> Indices:
-    """Pairs of neighbours, (E, 2), in a lattice of node numbers; -1 marks a place without a node."""
-    pairs = []
-    for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
-        tail = number[: len(number) - dx, max(0, -dy) : number.shape[1] - max(0, dy)]
-        head = number[dx:, max(0, dy) : number.shape[1] - max(0, -dy)]
-        both = (tail >= 0) & (head >= 0)
-        pairs.append(np.column_stack([tail[both], head[both]]))
-    return np.concatenate(pairs).astype(np.int64)
+@njit(cache=True)
+def _pairs(grid: Grid, number: Indices, radii: Array, partner: Indices, shut: npt.NDArray[np.bool_]) -> Indices:
+    """Pairs of nodes that may have an edge, each once, (E, 2)."""
+    # number: of the nodes of the lattice by column and row, or -1; they have edges to their neighbours
+    # radii: within which all other nodes have edges, (R,), m, but none to a `partner` or a node that is `shut`
+    nodes, columns, rows = grid.nodes, number.shape[0], number.shape[1]
+    pairs, count = np.empty((5 * len(nodes), 2), np.int64), 0
+    for column in range(columns):
+        for row in range(rows):
+            for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
+                x, y = column + dx, row + dy
+                if x < columns and 0 <= y < rows and number[column, row] >= 0 and number[x, y] >= 0:
+                    pairs[count, 0], pairs[count, 1] = number[column, row], number[x, y]
+                    count += 1
+    others = len(nodes) - len(radii)
+    for node in range(others, len(nodes)):
+        x, y, radius = nodes[node, 0], nodes[node, 1], radii[node - others]
+        left, right = _cells(x - radius, x + radius, grid, 0)
+        bottom, top = _cells(y - radius, y + radius, grid, 1)
+        for column in range(left, right + 1):
+            begin, end = column * grid.shape[1] + bottom, column * grid.shape[1] + top + 1
+            for near in grid.members[grid.first[begin] : grid.first[end]]:
+                dx, dy = nodes[near, 0] - x, nodes[near, 1] - y
+                squared = dx * dx + dy * dy
+                if squared > radius * radius or near == node or shut[near] or shut[node] or partner[near] == node:
+                    continue
+                if others <= near < node and squared <= radii[near - others] ** 2:
+                    continue  # it is there already
+                if count == len(pairs):
+                    pairs = np.concatenate((pairs, pairs))
+                pairs[count, 0], pairs[count, 1] = near, node
+                count += 1
+    return pairs[:count]
 
 
-def _other_edges(points: Array, radii: Array) -> Indices:
-    """Pairs of a node outside the lattice and any node within its radius, each pair once, (E, 2); `radii` (R,), m."""
-    others = np.arange(len(points) - len(radii), len(points))
-    near = cKDTree(points).query_ball_point(points[others], radii, return_sorted=True)
-    tails = np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(indices, dtype=np.int64) for indices in near)])
-    heads = np.repeat(others, [len(indices) for indices in near])
-    keys = (np.minimum(tails, heads) * len(points) + np.maximum(tails, heads))[tails != heads]
-    return np.column_stack(np.divmod(np.unique(keys), len(points)))
-
-
-def _is_short_cut(points: Array, pairs: Indices, robots: Sequence[RobotNodes]) -> npt.NDArray[np.bool_]:
-    """Which edges lead from a robot's start straight to its target. Other robots may be too near at both ends."""
-    short = np.zeros(len(pairs), dtype=bool)
-    for own in robots:
-        if np.hypot(*(points[own.start] - points[own.target])) > ROUNDING_M:
-            short |= np.isin(pairs, [own.start, own.target]).all(axis=1)
-    return short
+@njit(cache=True)
+def _cells(low: float, high: float, grid: Grid, axis: int) -> tuple[int, int]:
+    """First and last cell of an axis with nodes between two coordinates, m; `_grid` has no cells beyond its corner."""
+    most = grid.shape[axis] - 1
+    first, last = np.floor((low - grid.corner[axis]) / grid.size), np.floor((high - grid.corner[axis]) / grid.size)
+    return min(max(int(first), 0), most), min(max(int(last), 0), most)
 
 
 def _fan(space: Space, start: Array, far: float) -> Array:
@@ -270,13 +293,27 @@ def _fan(space: Space, start: Array, far: float) -> Array:
     return np.asarray(places[space.points_are_free(places, CHORDS * space.clearance)])
 
 
+@njit(cache=True)
 def _in_rows(points: Array, pairs: Indices) -> tuple[Indices, Indices, Array]:
     """Edges in both directions, sorted by tail and head: first edge of each node, heads, lengths."""
-    tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
-    tails, heads = np.divmod(np.sort(tails * len(points) + heads), len(points))
-    first = np.searchsorted(tails, np.arange(len(points) + 1)).astype(np.int64)
-    lengths = np.maximum(np.linalg.norm(points[heads] - points[tails], axis=1), ROUNDING_M)
-    return first, np.ascontiguousarray(heads), lengths
+    first = np.zeros(len(points) + 1, np.int64)
+    for k in range(len(pairs)):
+        first[pairs[k, 0] + 1] += 1
+        first[pairs[k, 1] + 1] += 1
+    first = np.cumsum(first)
+    end, unsorted, heads = first[:-1].copy(), np.empty(first[-1], np.int64), np.empty(first[-1], np.int64)
+    for k in range(len(pairs)):
+        for side in range(2):
+            tail = pairs[k, side]
+            unsorted[end[tail]] = pairs[k, 1 - side]
+            end[tail] += 1
+    end, lengths = first[:-1].copy(), np.empty(first[-1])
+    for tail in range(len(points)):  # tails in order make the other direction sorted by head
+        for head in unsorted[first[tail] : first[tail + 1]]:
+            dx, dy = points[head, 0] - points[tail, 0], points[head, 1] - points[tail, 1]
+            heads[end[head]], lengths[end[head]] = tail, max(np.sqrt(dx * dx + dy * dy), ROUNDING_M)
+            end[head] += 1
+    return first, heads, lengths
 
 
 def _grid(points: Array, low: Array, size: float) -> Grid:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from airground_drake.uav.coordination.roadmap import Roadmap, RobotNodes, RobotT
 from airground_drake.uav.coordination.timed import distance, free_pieces, timed, without_repeats
 
 ROUNDING_M = 1e-9  # distances between robots may fall short by this, m
+MOST_KNOWN = 16  # motions of which a mover remembers what they block: of many robots it would take much memory
 
 
 class OtherRobot(NamedTuple):
@@ -52,6 +53,9 @@ class Mover:
     space: Space  # discs and distances that it has to keep
     to_go: Array  # lower bound of the time from every node to its preset, (N,), s
     clear: npt.NDArray[np.bool_]  # which pieces of its preset between neighbouring nodes are free of discs, (K - 1,)
+    edges: intervals.Edges
+    # What other robots block, by the identity of a motion and a radius, and the motion, which keeps it alive.
+    blocked: dict[tuple[int, float], tuple[Indices, Array, Array]] = field(default_factory=dict)
 
     @classmethod
     def on(cls, roadmap: Roadmap, space: Space, task: RobotTask, speed: float, own: RobotNodes) -> Mover:
@@ -59,7 +63,8 @@ class Mover:
         places = roadmap.nodes[own.preset]
         clear = own.usable[:-1] & own.usable[1:] & space.segments_are_free(places[:-1], places[1:])
         to_go = roadmap.distances_to(own.preset[own.usable]) / speed
-        return cls(task, speed, own, roadmap, space, to_go, clear)
+        edges = intervals.Edges(roadmap.first_edge, roadmap.heads, roadmap.lengths / speed)
+        return cls(task, speed, own, roadmap, space, to_go, clear, edges)
 
 
 def find(
@@ -81,14 +86,16 @@ def find(
     nodes = np.concatenate([np.zeros(0, np.int64), *(nodes for nodes, _ in blocked)])
     times = np.concatenate([np.zeros((0, 2)), *(times for _, times in blocked)])
     free = intervals.safe_intervals(len(roadmap.nodes), nodes, times)
-    edges = intervals.Edges(roadmap.first_edge, roadmap.heads, roadmap.lengths / mover.speed)
     joins = _joins(mover, fixed, follow)
-    route, arrivals, joined, spent = intervals.search(edges, free, own.start, joins, mover.to_go, budget)
+    route, arrivals, joined, spent = intervals.search(mover.edges, free, own.start, joins, mover.to_go, budget)
     return (_way(roadmap, mover, route, arrivals, joined) if len(route) else None), int(spent)
 
 
 def _blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
     """Nodes (B,) that another robot blocks, and when, (B, 2), s. Start and target have smaller radii, see `find`."""
+    known = mover.blocked.get((id(other.motion), other.radius))
+    if known is not None:
+        return known[0], np.minimum(known[1], other.until)
     roadmap, space = mover.roadmap, mover.space
     start, target = roadmap.nodes[mover.own.start], roadmap.nodes[mover.own.target]
     at_first = float(np.hypot(*(start - other.motion[0, 1:])))
@@ -97,6 +104,9 @@ def _blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
     radii = np.full(len(roadmap.nodes), space.wide(roadmap.longest, other.radius))
     np.minimum.at(radii, [mover.own.start, mover.own.target], near)
     nodes, times = intervals.blocked_times(other.motion, roadmap.grid, radii)
+    if len(mover.blocked) == MOST_KNOWN:
+        mover.blocked.clear()
+    mover.blocked[id(other.motion), other.radius] = nodes, times, other.motion
     return nodes, np.minimum(times, other.until)
 
 
@@ -132,12 +142,9 @@ def _way(roadmap: Roadmap, mover: Mover, route: Indices, arrivals: Array, joined
     """The motion along a route with its waits, then along the preset from the time `joined`, s, on."""
     places = roadmap.nodes[route]
     lengths = np.hypot(*np.diff(places, axis=0).T)
-    leaves = arrivals[1:] - np.maximum(lengths, ROUNDING_M) / mover.speed
-    rows = [np.array([[arrivals[0], *places[0]]])]
-    for k, leave in enumerate(leaves.tolist()):
-        rows.append(np.array([[leave, *places[k]], [arrivals[k + 1], *places[k + 1]]]))
-    rows.append(np.array([[joined, *places[-1]]]))
-    before = without_repeats(np.concatenate(rows))
+    leaves = np.append(arrivals[1:] - np.maximum(lengths, ROUNDING_M) / mover.speed, joined)
+    times = np.column_stack([arrivals, leaves]).ravel()
+    before = without_repeats(timed(times, np.repeat(places, 2, axis=0)))
     preset = mover.task.preset
     after = preset[preset[:, 0] > joined + 1e-9]
     return Way(np.concatenate([before, after]), joined, len(before))
