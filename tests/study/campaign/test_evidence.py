@@ -1,7 +1,5 @@
 """Conclusions, on rows that were made up."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

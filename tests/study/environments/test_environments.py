@@ -1,7 +1,5 @@
 """Step-wise environments: API checkers, whole episodes again, and the same run as an ordinary policy makes."""
 
-from __future__ import annotations
-
 import copy
 import importlib
 import sys
