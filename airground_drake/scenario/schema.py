@@ -625,9 +625,7 @@ class Scenario:
     to those of the package: `module:Class` or `file.py:Class` by identifier.
     """
 
-    __pydantic_config__: ClassVar = ConfigDict(
-        extra="forbid", revalidate_instances="always", use_attribute_docstrings=True
-    )
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", revalidate_instances="always")
 
     name: Name
     """Its name: letters, digits and underscores."""
