@@ -97,7 +97,7 @@ def as_run(scenario: Json, name: str) -> Json:
 
 def uavs_of(scenario: Json) -> dict[str, Json]:
     """Each UAV's part of the scenario, by name."""
-    return {scenario["uav"]["name"]: scenario["uav"]}
+    return scenario.get("uavs") or {scenario["uav"]["name"]: scenario["uav"]}
 
 
 def robots_of(scenario: Json) -> dict[str, Json]:
@@ -174,7 +174,8 @@ def pairs_of(scenario: Json) -> list[Pair]:
             ]
     beside_robots = []
     for first, second in combinations(robots, 2):
-        gap_m = safe["air_ground_m" if second in uavs else "ugv_m"]
+        kinds = {"uav" if name in uavs else "ugv" for name in (first, second)}
+        gap_m = safe["air_ground_m" if len(kinds) == 2 else f"{kinds.pop()}_m"]
         radii = radii_m(robots[first], robots[second])
         beside_robots.append(Pair(first, second, gap_m, radii, limit[first] + limit[second], 0.5))
     room = {name: taken(robot, scenario["control"]) for name, robot in robots.items()}

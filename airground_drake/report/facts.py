@@ -185,6 +185,12 @@ class RunFacts:
         return [*self._scenario.aerial]
 
     @property
+    def lost_s(self) -> dict[str, float]:
+        """When UAVs were lost, s, by name."""
+        until = self._scenario.duration_s
+        return {name: uav.lost_at_s for name, uav in self._scenario.aerial.items() if 0.0 < uav.lost_at_s < until}
+
+    @property
     def ends_too_early(self) -> bool:
         """Whether all UGVs that did not arrive were coming nearer to their targets when the run ended."""
         return all(self.way(ugv).left_s is not None for ugv in self.ugvs if ugv not in self.home)

@@ -209,6 +209,7 @@ def _uav(run: RunFacts) -> Cell:
     if run.refusals:
         (reason, _), *others = run.refusals.most_common()
         lines.append(f"{'mostly' if others else 'why'} refused: {refusal(reason)}")
+    lines += [f"{name} was lost at {lost_s:g} s" for name, lost_s in run.lost_s.items()]
     if failed := len(run.run.faults):
         lines.append(f"policy failed {counted(failed, 'time')}")
     messages = run.run.metrics.messages

@@ -30,7 +30,7 @@ class PairBudget(NamedTuple):
 
     first: str  # a robot
     second: str  # a robot, an obstacle, the map or a wall of the arena
-    kind: str  # `ugv`, `air_ground`, `obstacle`, or `moving` for an obstacle that may move
+    kind: str  # `ugv`, `uav`, `air_ground`, `obstacle`, or `moving` for an obstacle that may move
     promised_m: float  # gap to be kept between the surfaces, m
     radii_m: float  # sum of both radii, m
     law_m: float  # distance that the law keeps between steered points, or a steered point and a core, m

@@ -27,6 +27,7 @@ def make_world(scenario: Scenario) -> World:
     apart: dict[frozenset[Kind], float] = {
         frozenset(("ugv",)): safe.ugv_m,
         frozenset(("ugv", "uav")): safe.air_ground_m,
+        frozenset(("uav",)): safe.uav_m,
     }
     return World((*robots, *obstacles), apart, control.avoidance_gain_1_s)
 

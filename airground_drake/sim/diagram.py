@@ -27,6 +27,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import (
+    AllProposals,
     DecisionVariable,
     DirectAcceptance,
     Downlink,
@@ -149,7 +150,8 @@ def build_model(
     channel, period = scenario.channel if chosen.intervenes else None, scenario.control.period_s
     plans = {uav: components.make_planner(scenario, chosen, uav) for uav in scenario.aerial}
     planners = {
-        uav: InterventionPlanner(planner, world, period, channel=channel is not None) for uav, planner in plans.items()
+        uav: InterventionPlanner(planner, world, period, channel=channel is not None, alone=len(plans) == 1)
+        for uav, planner in plans.items()
     }
     gatekeeper, retry = None, components.repeats_after(scenario)
     if chosen.gated:
@@ -250,19 +252,29 @@ def _task_planning(
     systems |= {name: planners[uav] for uav, name in _named("intervention_planner", planners).items()}
     systems |= {"ugv_controller": ugvs}
     systems |= {name: uavs[uav] for uav, name in _named("uav_controller", uavs).items()}
-    (planner,), (uav,) = planners.values(), uavs.values()
+    asks: System
+    flies: System
+    wires = []
+    if len(uavs) == 1:
+        (asks,), (flies,) = planners.values(), uavs.values()
+    else:
+        asks, flies = AllProposals([*uavs], len(presets)), Multiplexer([3] * len(uavs))
+        systems |= {"all_proposals": asks, "uav_command": flies}
+        for k, uav in enumerate(uavs):
+            wires.append((planners[uav].GetOutputPort("proposals"), asks.GetInputPort(f"proposals_{uav}")))
+            wires.append((uavs[uav].GetOutputPort("command"), flies.get_input_port(k)))
     named = {
         "reference": reference.get_output_port(),
-        **{port.get_name(): port for port in _outputs(planner)},
+        **{port.get_name(): port for port in _outputs(asks)},
         "ugv_command": ugvs.GetOutputPort("command"),
         "executing": ugvs.GetOutputPort("executing"),
         **({"command_share": ugvs.GetOutputPort("command_share")} if ugvs.HasOutputPort("command_share") else {}),
         "gains": ugvs.GetOutputPort("gains"),
-        "uav_command": uav.GetOutputPort("command"),
+        "uav_command": flies.get_output_port(0),
     }
     renamed: dict[System, Mapping[str, str]] = dict.fromkeys([ugvs, *uavs.values()], measured)
     renamed |= dict.fromkeys(planners.values(), dict.fromkeys(measured, "seen_by_uav"))
-    return _assembled("task_planning", systems, named, renamed=renamed)
+    return _assembled("task_planning", systems, named, None, wires, renamed=renamed)
 
 
 def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:
@@ -399,6 +411,7 @@ def _uav_controller(scenario: Scenario, world: World, name: str) -> UavControlle
         world,
         components.make_avoidance(scenario),
         uav=name,
+        ugvs=scenario.in_charge(name),
         task=UAV_TASKS.load(uav.task, of=Task),
         gain=scenario.control.formation_gain_1_s,
         altitude=uav.altitude_m,

@@ -134,6 +134,8 @@ class Planner:
     trails: tuple[bool, ...] = ()
     sender: Sender = ONLY  # the UAV
     lead: float = 0.0  # time that a proposal is under way, s
+    charge: tuple[bool, ...] = ()  # per UGV, whether the UAV is in charge of it; default: of all
+    lost_at: float = np.inf  # from this time on the UAV neither sends nor hears anything, s
 
     @property
     def radii(self) -> Array:
@@ -160,7 +162,7 @@ class Planner:
         """Until when planning changes nothing, s, while the same UGVs are triggered; -inf: it may do so at once."""
         # Without a proposal in force no answer is read. Then a negotiation changes only when its rest is over, or when
         # neither its UGV nor its cause is triggered any more.
-        called = {name for name, triggered in zip(self.ugvs, intervening, strict=True) if triggered}
+        called = {name for name, own in zip(self.ugvs, self._own(intervening), strict=True) if own}
         until = math.inf
         for name, talk in zip(self.ugvs, memory.talks, strict=True):
             if talk.proposal is not None or (talk != Negotiation() and called.isdisjoint((name, talk.cause))):
@@ -168,6 +170,16 @@ class Planner:
             if name in called:
                 until = min(until, talk.retry_at)
         return until
+
+    def _own(self, intervening: Sequence[bool]) -> list[bool]:
+        """Which UGVs the UAV is to intervene on: those that are triggered and in its charge."""
+        return [a and b for a, b in zip(intervening, self.charge or (True,) * len(self.ugvs), strict=True)]
+
+    def lost(self, memory: PlannerState, t: float) -> PlannerState:
+        """The memory at time t, s, when the UAV is lost: no UGV holds a proposal any more whose motion is over."""
+        over = [talk.proposal is not None and t >= talk.proposal.motion.end for talk in memory.talks]
+        talks = [Negotiation() if gone else talk for gone, talk in zip(over, memory.talks, strict=True)]
+        return replace(memory, talks=tuple(talks)) if any(over) else memory
 
     def plan(
         self,
@@ -179,9 +191,11 @@ class Planner:
         reports: Reports,
         standing: Sequence[bool] = (),
         sightings: Sequence[Sighting] = (),
+        others: Proposals = (),
     ) -> PlannerState:
         """The memory after one planning period; `t` in s; `positions` of r robots (r, 3), m; `answers` (2n,)."""
         # standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
+        # others: per UGV, what any UAV asks of it; default: there is one UAV.
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
         unknown = {row for report in heard for row in report.sensed} - set(memory.learnt)
@@ -201,9 +215,9 @@ class Planner:
             read=(*memory.read, *((report.number, t) for report in heard if report.number > newest)),
             seen=tuple(latest.values()),
         )
-        if not any(called and talk.is_due(t) for called, talk in zip(intervening, talks, strict=True)):
+        if not any(called and talk.is_due(t) for called, talk in zip(self._own(intervening), talks, strict=True)):
             return memory
-        return self._asked(memory, t, positions, intervening, answers, standing, sightings)
+        return self._asked(memory, t, positions, intervening, answers, standing, sightings, others)
 
     def _asked(
         self,
@@ -214,6 +228,7 @@ class Planner:
         answers: Array,
         standing: Sequence[bool],
         sightings: Sequence[Sighting],
+        others: Proposals,
     ) -> PlannerState:
         """The memory after the policies were asked for all triggered UGVs that need a proposal."""
         mapped = self.mapped[self._there(t)]
@@ -221,8 +236,9 @@ class Planner:
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen}
         moving = self._moving(t, {sighting.name: sighting for sighting in sightings}, latest)
         talks, asked, memories = list(memory.talks), list(memory.asked), dict(enumerate(memory.memories))
+        own = self._own(intervening)
         for i, robot in enumerate(self.ugvs):
-            if not (intervening[i] and talks[i].is_due(t)):
+            if not (own[i] and talks[i].is_due(t)):
                 continue
             seen = Observation(
                 t=t,
@@ -235,7 +251,7 @@ class Planner:
                 mapped=mapped,
                 others=np.delete(positions, i, axis=0),
                 refusals=talks[i].refusals,
-                team=self._team(t, positions, intervening, answers, talks, standing),
+                team=self._team(t, positions, intervening, answers, talks, standing, others),
                 robot_distance=self.robot_distance,
                 radius=float(self.radii[i]),
                 moving=moving,
@@ -309,8 +325,11 @@ class Planner:
         answers: Array,
         talks: Sequence[Negotiation],
         standing: Sequence[bool],
+        others: Proposals,
     ) -> tuple[Teammate, ...]:
         """All UGVs as the UAV sees them at time t, s."""
+        charge = self.charge or (True,) * len(self.ugvs)
+        asked = [talk.proposal if charge[i] else others[i] for i, talk in enumerate(talks)]
         return tuple(
             Teammate(
                 name=name,
@@ -320,12 +339,13 @@ class Planner:
                 max_speed=float(self.max_speed[i]),
                 triggered=bool(intervening[i]),
                 standing=standing[i] if standing else False,
-                proposal=talks[i].proposal,
-                answered=_WORDS.get(answer_to(talks[i].proposal, answers, i), "silent"),
+                proposal=asked[i],
+                answered=_WORDS.get(answer_to(asked[i], answers, i), "silent"),
                 refusals=talks[i].refusals,
                 too_fast=talks[i].too_fast,
                 resting=talks[i].refused_lately(t),
                 radius=float(self.radii[i]),
+                in_charge=charge[i],
             )
             for i, name in enumerate(self.ugvs)
         )

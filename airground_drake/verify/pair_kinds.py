@@ -16,8 +16,8 @@ from airground_drake.scenario.plants import bounds_of, plant_of
 from airground_drake.scenario.schema import Control, Scenario, Uav, Ugv
 
 # By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none.
-SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
-KINDS = {"air_ground": "uav_ugv", "ugv": "ugv_ugv"}  # by `Scenario.pair_of`, of two robots
+KINDS = {"air_ground": "uav_ugv", "ugv": "ugv_ugv", "uav": "uav_uav"}  # by `Scenario.pair_of`, of two robots
+SHARES = {"obstacle": (Fraction(1), Fraction(0)), **dict.fromkeys(KINDS.values(), (Fraction(1, 2),) * 2)}
 MOVING = "moving"  # the kind of a robot beside an obstacle that may move: no theorem keeps its distance
 # The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points.
 STEERED = "steered"

@@ -1,7 +1,5 @@
 """`airground judge`: the log of an experiment, judged on the command line."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable
@@ -56,6 +54,13 @@ def test_a_run_that_obeyed_the_law_is_promised_its_distances(run: Run, judged: C
         assert all(pair["promised_m"] == pytest.approx(pair["safe_m"], abs=1e-9) for pair in found["pairs"])
         assert all(all(pair["hypotheses"].values()) for pair in found["pairs"])
         assert (found["status"], found["covered"]["all"]) == ("kept", True)
+
+
+def test_distances_between_uavs_are_judged(run: Run, judged: Callable[..., dict[str, Any]]) -> None:
+    found = judged(sampled(run("two_uavs", "d")), "two_uavs")
+    (pair,) = [pair for pair in found["pairs"] if (pair["first"], pair["second"]) == ("north", "south")]
+    assert pair["status"] == found["status"] == "kept"
+    assert pair["missed_m"] <= 1e-12
 
 
 def test_a_run_that_hits_an_obstacle_is_exit_code_1(run: Run, judged: Callable[..., dict[str, Any]]) -> None:

@@ -1,7 +1,5 @@
 """The protocol: who had which proposal in force when, and who executed which, from messages and modes alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
@@ -66,14 +64,23 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
         if sent.number not in {*of["proposal"]["number"]}:
             yield Fault("a proposal is no message", sent.ugv, sent.issued_s)
         due, recorded = withdrawn_s(trace, sent), withdrawn.get(sent.number, np.inf)
+        due = due if due < lost_s(trace, sent) - TIME_TOLERANCE_S else np.inf  # nobody is left to say so
         if min(due, ends) != min(recorded, ends) and abs(due - recorded) > TIME_TOLERANCE_S:
             yield Fault("withdrawn at another time", sent.ugv, sent.issued_s, {"due": due, "recorded": recorded})
 
 
 def _misused(trace: Trace) -> Iterator[Fault]:
-    """Wrong causes, joint plans not sent whole, decisions on withdrawn proposals, replacements without a reason."""
-    every = proposals_of(trace)
+    """Wrong senders and causes, joint plans not sent whole, decisions on what is over, needless replacements."""
+    every, scenario = proposals_of(trace), trace.scenario
+    heard = trace.messages[trace.messages["kind"] == "answer"].dropna(subset="read_s")
+    for uav, read_s in zip(heard["receiver"], heard["read_s"], strict=True):
+        if read_s > (scenario.aerial[uav].lost_at_s or np.inf) - TIME_TOLERANCE_S:
+            yield Fault("an answer is read by a UAV that is lost", uav, read_s)
     for sent in every:
+        if not {sent.ugv, sent.cause, *sent.party} <= {*scenario.in_charge(sent.sender)}:
+            yield Fault("sent by a UAV that is not in charge", sent.ugv, sent.issued_s, sent.sender)
+        if sent.issued_s > lost_s(trace, sent) - TIME_TOLERANCE_S:
+            yield Fault("sent by a UAV that is lost", sent.ugv, sent.issued_s, sent.sender)
         if not _is_cause(trace, sent):
             yield Fault("sent for a UGV that is not intervened on", sent.ugv, sent.issued_s, sent.cause)
         if missing := {*sent.party} - {sent.ugv, *(part.ugv for part in parts_of(trace, sent))}:
@@ -84,7 +91,8 @@ def _misused(trace: Trace) -> Iterator[Fault]:
     for ugv in trace.ugvs:
         for before, after in pairwise(sent for sent in every if sent.ugv == ugv):
             t, row = after.issued_s + TIME_TOLERANCE_S, row_at(trace, after.issued_s)
-            others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in trace.ugvs if other != ugv)
+            mates = [other for other in scenario.in_charge(after.sender) if other != ugv]
+            others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in mates)
             alone = not (after.party or others) and after.cause == ugv
             if alone and withdrawn_s(trace, before, unless_replaced=True) > t and before.times_s[-1] > t:
                 yield Fault("replaced while in force", ugv, after.issued_s, after.policy)
@@ -99,6 +107,11 @@ def _is_cause(trace: Trace, sent: ProposalRecord) -> bool:
     row = row_at(trace, sent.issued_s)
     called = {name: trace.column(f"{name}.mode")[row : row + 2] == 1.0 for name in (sent.ugv, sent.cause)}
     return bool(called[sent.cause].any()) and (sent.cause == sent.ugv or not called[sent.ugv].all())
+
+
+def lost_s(trace: Trace, sent: ProposalRecord) -> float:
+    """When the UAV that sent a proposal is lost, s; infinite if it never is."""
+    return trace.scenario.aerial[sent.sender].lost_at_s or np.inf
 
 
 def parts_of(trace: Trace, sent: ProposalRecord) -> list[ProposalRecord]:
@@ -183,6 +196,8 @@ def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = F
     - the motion has run out;
     - another proposal is sent to the UGV (not counted with `unless_replaced`);
     - the UAV has a refusal of it, or of another part of its joint plan.
+
+    Once the UAV is lost, a proposal is over when its motion has run out, and nobody says so.
     """
 
     def first() -> float:
@@ -220,6 +235,9 @@ def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> 
         refused = bool(before) and before[-1].refused
         # the clock's rounding decides whether a motion that ends at this very instant has run out
         ended = t[row] >= sent.times_s[-1] or (bool(before) and before[-1].done)
-        if not called[row] or ended or refused or replaced <= now + TIME_TOLERANCE_S:
+        if now >= lost_s(trace, sent) - TIME_TOLERANCE_S:
+            if t[row] >= sent.times_s[-1]:
+                return now, False
+        elif not called[row] or ended or refused or replaced <= now + TIME_TOLERANCE_S:
             return now, refused
     return np.inf, False

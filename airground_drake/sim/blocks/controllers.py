@@ -170,7 +170,7 @@ def _asked(proposal: Proposal, t: float) -> AcceptedMotion:
 
 
 class UavController(_Controller):
-    """NSBC of a UAV: obstacle avoidance (11) above a task, by default to stay over the UGVs' centroid, (9)-(10).
+    """NSBC of a UAV: obstacle avoidance (11) above a task, by default to stay over its UGVs' centroid, (9)-(10).
 
     Ports (n UGVs, M bodies that move, world frame):
         in  `bodies` (3M) m; `ugv_command` (3n) m/s, fed forward as the centroid's rate.
@@ -190,6 +190,7 @@ class UavController(_Controller):
         gain: float,
         altitude: float,
         uav: str = "",
+        ugvs: Sequence[str] = (),
         task: Callable[[Array, Array, float, float], Task] = FormationTask,
     ) -> None:
         """Declare ports, state and the periodic update.
@@ -200,7 +201,8 @@ class UavController(_Controller):
             gain: of the task, 1/s, by default.
             altitude: m.
             uav: name of the UAV; default: the first of the world.
-            task: makes the task of a sample from positions (n, 3), m, and velocities (n, 3), m/s, of the UGVs,
+            ugvs: names of the k UGVs that it is in charge of; default: all.
+            task: makes the task of a sample from positions (k, 3), m, and velocities (k, 3), m/s, of these UGVs,
                 altitude and gain; it gives the velocity of one robot, (1, 3), m/s.
         """
         super().__init__()
@@ -209,7 +211,9 @@ class UavController(_Controller):
         self._gain = gain
         self._altitude = altitude
         row = world.robots.index(uav) if uav else world.select("uav").start
-        self._world, self._ugvs, self._own = world, world.select("ugv"), slice(row, row + 1)
+        self._world, self._own = world, slice(row, row + 1)
+        some = 0 < len(ugvs) < len(world.names("ugv"))
+        self._ugvs = [world.index(ugv) for ugv in ugvs] if some else world.select("ugv")
         self._near = world.around(self._own)
         self._bodies = declare_bodies(self, world)
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
@@ -249,7 +253,7 @@ class UavController(_Controller):
 
     def _asked(self, positions: Array, ugv_commands: Array, gain: float) -> Array:
         """Velocity that the task asks for, (1, 3), m/s. The answer of a third-party task is checked."""
-        ugvs, own = positions[self._ugvs], positions[self._own]
+        ugvs, own, ugv_commands = positions[self._ugvs], positions[self._own], ugv_commands[self._ugvs]
         if self._task is FormationTask:
             return FormationTask(ugvs, ugv_commands, self._altitude, gain).velocity(own)
         name = getattr(self._task, "__name__", type(self._task).__name__)

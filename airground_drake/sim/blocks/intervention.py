@@ -1,12 +1,15 @@
-"""The UAV's planner: proposals for the UGVs that the trigger has flagged."""
+"""The UAVs' planners: proposals for the UGVs that the trigger has flagged."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State, ValueProducer
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import ROBOTS, World
 from airground_drake.model.trigger.automaton import FIELDS, INTERVENING
 from airground_drake.sim.blocks.lifetime import weakly
@@ -18,6 +21,7 @@ from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import Report, Reports, sightings
 from airground_drake.uav.outbox import answers_heard
 from airground_drake.uav.planner import Planner, PlannerState, sent_after
+from airground_drake.uav.policy import Proposal
 
 
 class _Ahead(list[PlannerState | None]):
@@ -32,7 +36,7 @@ class InterventionPlanner(LeafSystem):
 
     Ports (n UGVs, M bodies that move):
         in  `bodies` (3M) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
-            (abstract), see `messages`.
+            (abstract), see `messages`. With several UAVs `proposals` of all of them (see `AllProposals`).
         out `proposals` abstract, n of Proposal or None.
         With a channel `heard`, see `Uplink`, in place of answers and reports, and `sent`, the `PlannerState`, in place
         of `proposals`.
@@ -40,8 +44,11 @@ class InterventionPlanner(LeafSystem):
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
 
-    def __init__(self, planner: Planner, world: World, control_period: float, *, channel: bool = False) -> None:
+    def __init__(
+        self, planner: Planner, world: World, control_period: float, *, channel: bool = False, alone: bool = True
+    ) -> None:
         """Declare ports, state and the periodic update; the controllers' period is in s."""
+        # alone: whether there is one UAV.
         super().__init__()
         self._planner, self._world = planner, world
         n = len(planner.ugvs)
@@ -55,6 +62,7 @@ class InterventionPlanner(LeafSystem):
             self._answers = self.DeclareVectorInputPort("answers", 2 * n)
             self._reports = Messages(self, "reports", n, Report)
         self._channel = channel
+        self._others = None if alone else Messages(self, "proposals", n, Proposal)
         held = self.DeclareAbstractState(Value(planner.start()))
         self._memory = int(held)
         remembers = {self.abstract_state_ticket(held)}
@@ -135,6 +143,8 @@ class InterventionPlanner(LeafSystem):
         if not self._ticks.due(t):
             return None
         before = self.memory(context)
+        if t >= self._planner.lost_at - SAME_S:
+            return self._planner.lost(before, t)
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
         if t < self._planner.asleep_until(before, intervening):
             return None
@@ -142,5 +152,30 @@ class InterventionPlanner(LeafSystem):
         answers, reports = self._answered(context)
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         moving = sightings(self._world, t, bodies)
-        memory = self._planner.plan(before, t, bodies[self._robots], intervening, answers, reports, stands, moving)
+        others = () if self._others is None else self._others.Eval(context)
+        memory = self._planner.plan(
+            before, t, bodies[self._robots], intervening, answers, reports, stands, moving, others
+        )
         return sent_after(before, memory, t, self._planner.sender)
+
+
+class AllProposals(LeafSystem):
+    """What several UAVs ask of the UGVs, each of its own.
+
+    Ports (n UGVs): in `proposals_<uav>`, out `proposals`, abstract, n of Proposal or None.
+    """
+
+    def __init__(self, uavs: Sequence[str], count: int) -> None:
+        """Declare ports for some UAVs and so many UGVs."""
+        super().__init__()
+        self._of_uavs = [Messages(self, f"proposals_{uav}", count, Proposal) for uav in uavs]
+        self.DeclareAbstractOutputPort(
+            "proposals",
+            lambda: no_proposals(count),
+            weakly(self._calc),
+            prerequisites_of_calc={messages.port.ticket() for messages in self._of_uavs},
+        )
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        asked = zip(*(messages.Eval(context) for messages in self._of_uavs), strict=True)
+        output.set_value(tuple(next((one for one in of_ugv if one is not None), None) for of_ugv in asked))
