@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections import defaultdict
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -28,12 +29,19 @@ def test_gatekeepers_know_of_interventions_only_what_is_sent() -> None:
     found = {
         node.module
         for path in (PACKAGE / "ugv").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(tree(path))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airground_drake.uav")
     }
-    assert found == {"airground_drake.uav.messages", "airground_drake.uav.policy"}
+    assert found == {f"airground_drake.uav.{name}" for name in ("channel", "messages", "policy")}
 
 
+@cache
+def tree(path: Path) -> ast.Module:
+    """What a file says."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imported() -> dict[str, set[str]]:
     """The modules of the package that each module imports anywhere: in functions and for types, too."""
     modules = {
@@ -43,7 +51,7 @@ def imported() -> dict[str, set[str]]:
     found = {name: set[str]() for name in modules if name != "airground_drake"}
     for name, uses in found.items():
         parents = name.split(".") if modules[name].name == "__init__.py" else name.split(".")[:-1]
-        for node in ast.walk(ast.parse(modules[name].read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(modules[name])):
             if isinstance(node, ast.ImportFrom):
                 base = [*parents[: len(parents) + 1 - node.level], *filter(None, [node.module])] if node.level else []
                 source = ".".join(base) or str(node.module)
@@ -56,7 +64,7 @@ def imported() -> dict[str, set[str]]:
 
 def declared(room: str) -> set[str]:
     """The rooms that a room says it may import; it says what enters and what leaves, too."""
-    says = ast.get_docstring(ast.parse((PACKAGE / room / "__init__.py").read_text(encoding="utf-8"))) or ""
+    says = ast.get_docstring(tree(PACKAGE / room / "__init__.py")) or ""
     lines = re.search(r"^Enters: .+\.\nLeaves: .+\.\nMay import: (.+)\.$", says, re.MULTILINE)
     assert lines, room
     return set(re.findall(r"`(\w+)`", lines[1]))
@@ -94,7 +102,7 @@ def test_a_plant_is_named_in_its_own_file_only() -> None:
     """Whoever asks for a kind by its name would have to be found for each new plant; the checker is apart."""
     for path in sorted({*PACKAGE.rglob("*.py")} - {*(PACKAGE / "check").rglob("*.py")}):
         file = path.relative_to(PACKAGE).as_posix()
-        texts = {node.value for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        texts = {node.value for node in ast.walk(tree(path))
                  if isinstance(node, ast.Constant) and isinstance(node.value, str)}  # fmt: skip
         named = texts & {*PLANTS.own}
         assert named <= ({path.stem} if file.startswith("model/plants/") else set()) or file in TERMS, (file, named)

@@ -47,6 +47,7 @@ def processors() -> int:
 @contextmanager
 def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
     """A pool of `jobs` processes. Processes that still work at the end of the block are killed."""
+    # An AirgroundError is raised if a process has died, and nobody in the block has noticed.
     # The first call forks them, and they see everything that exists then. Where forking is not safe, they start empty.
     # Calls and results are pickled.
     before = set(multiprocessing.active_children())
@@ -56,6 +57,8 @@ def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
             yield pool
+    except BrokenProcessPool as error:
+        raise AirgroundError("a worker process died") from error
     finally:
         for process in set(multiprocessing.active_children()) - before:
             process.kill()
@@ -85,40 +88,8 @@ def run_parallel(
             for future in as_completed(futures):
                 _done(future.result(), called[futures[future]], progress)
             return [future.result()[0] for future in futures]  # type: ignore[misc]
-    except BrokenProcessPool as error:
-        raise AirgroundError("a worker process died") from error
     finally:
         _pieces = ()
-
-
-def start_in_process(work: Callable[[], T]) -> Callable[[], T]:
-    """Start work in its own process; returns a function that waits for the result, to be called once."""
-    # With one processor, or without fork, that function does the work. It raises an AirgroundError if the process dies.
-    if not forks() or processors() == 1:
-        return work
-    context = multiprocessing.get_context("fork")
-    receiver, sender = context.Pipe(duplex=False)
-
-    def done() -> None:
-        end_with_parent()
-        sender.send(work())
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
-        process = context.Process(target=done, daemon=True)
-        process.start()
-    sender.close()
-
-    def returned() -> T:
-        try:
-            answer: T = receiver.recv()
-        except EOFError:
-            process.join()
-            raise AirgroundError(f"a process died before its work was done (exit code {process.exitcode})") from None
-        process.join()
-        return answer
-
-    return returned
 
 
 def _begin() -> None:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from airground_drake.base import files
 from airground_drake.base.parallel import processors
 from airground_drake.base.usage import output_file, refuse
-from airground_drake.scenario.document import parsed
 from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
@@ -70,6 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
     """Distances and arrivals by the values of one key."""
+    from airground_drake.scenario.document import parsed
     from airground_drake.study.campaign.vary import as_text, usual_values, vary
 
     key, _, given = options.vary.partition("=")

@@ -16,15 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airground_drake.base.errors import (
-    AirgroundError,
-    FolderError,
-    LimitError,
-    PluginError,
-    ScenarioError,
-    UnknownNameError,
-    one_line,
-)
+from airground_drake.base import errors
 from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.usage import EXIT_TOOL, formats_of, positive, refuse, whole
 from airground_drake.report import folder
@@ -58,14 +50,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     command = ["airground", "report", *(sys.argv[1:] if arguments is None else arguments)]
     try:
-        return _reported(options, one_line(shlex.join(command)))
-    except LimitError as error:
+        return _reported(options, errors.one_line(shlex.join(command)))
+    except errors.LimitError as error:
         return refuse(f"{error}; see --limit-steps and --limit-memory")
-    except (ScenarioError, PluginError, UnknownNameError, FolderError) as error:
+    except (errors.ScenarioError, errors.PluginError, errors.UnknownNameError, errors.FolderError) as error:
         return refuse(error)
     except BrokenPipeError:  # the output pipe is closed
         raise
-    except (AirgroundError, OSError) as error:
+    except (errors.AirgroundError, OSError) as error:
         return refuse(error, EXIT_TOOL)
 
 
@@ -107,7 +99,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
             print(f"{item.words}{f', run {item.run}' if item.run else ''}")
         print(terminal.text(report))
         print(f"{scenario.name}: {overall.status.replace('_', ' ')}. {overall.why}")
-        print(one_line(str(output)))
+        print(errors.one_line(str(output)))
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
     return overall.exit_code

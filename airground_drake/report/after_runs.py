@@ -5,13 +5,12 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
-from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from airground_drake.base import files
-from airground_drake.base.parallel import start_in_process
+from airground_drake.base.parallel import processes
 from airground_drake.base.progress import Progress
 from airground_drake.report import document, folder, junit, metrics, model
 from airground_drake.report.figures.draw import draw
@@ -52,10 +51,11 @@ def judge(
 ) -> JudgedRuns:
     """Judge the runs and the model and, if asked for, the paper and other seeds; draw the runs at the same time."""
     of_seeds = with_seeds(scenario, traces, seeds, progress) if seeds else ()
-    figures = start_in_process(partial(draw, scenario, traces)) if drawn else list
-    verdicts = judge_all(scenario, traces.values(), kept=kept, progress=progress)
-    findings = audit(scenario, traces, verdicts) if audit else ()
-    return JudgedRuns(traces, verdicts, findings, figures(), of_seeds)
+    with processes(1) as another:
+        figures = another.submit(draw, scenario, traces) if drawn else None
+        verdicts = judge_all(scenario, traces.values(), kept=kept, progress=progress)
+        findings = audit(scenario, traces, verdicts) if audit else ()
+        return JudgedRuns(traces, verdicts, findings, figures.result() if figures else (), of_seeds)
 
 
 def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progress: Progress) -> list[dict[str, Any]]:

@@ -7,8 +7,8 @@ the filter of claims, nothing else.
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
-from functools import cache, partial
+from collections.abc import Sequence
+from functools import cache
 from hashlib import sha256
 from importlib import resources
 from typing import Any
@@ -24,7 +24,7 @@ from airground_drake.report.mathml import mathml
 from airground_drake.report.model import Claim, Report
 from airground_drake.report.outcomes import pairs
 from airground_drake.report.proved import place
-from airground_drake.report.reproduction import YES_NO
+from airground_drake.report.quantities import number, told
 from airground_drake.report.screen import first_screen
 from airground_drake.report.sentences import MARKS, grouped, unbroken
 from airground_drake.report.templating import environment_of
@@ -132,9 +132,8 @@ def environment() -> Environment:
     style = stylesheet()
     script = _template(SCRIPT)
     environment.filters.update(
-        num=number, value=value, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
-        evidence=evidence_tables, proof=place, records=partial(evidence.tables, number=number), brief=brief,
-        unbroken=unbroken,
+        num=number, told=told, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
+        evidence=evidence_tables, proof=place, records=evidence.tables, unbroken=unbroken,
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS, max_interventions=MAX_INTERVENTIONS,
@@ -186,42 +185,9 @@ def evidence_tables(claim: Claim) -> list[Table]:
     """Counterexample and evidence of a claim as tables."""
     on = f", run {claim.run}" if claim.run else ""
     return [
-        *evidence.tables(claim.counterexample or {}, f"{claim.id}, counterexample{on}", number),
-        *evidence.tables(claim.evidence, f"{claim.id}, evidence{on}", number),
+        *evidence.tables(claim.counterexample or {}, f"{claim.id}, counterexample{on}"),
+        *evidence.tables(claim.evidence, f"{claim.id}, evidence{on}"),
     ]
-
-
-def number(x: Any, digits: int = 4) -> str:
-    """A number for reading, a dash for none."""
-    if x is None:
-        return "\N{EN DASH}"
-    if isinstance(x, bool) or not isinstance(x, (int, float)):
-        return str(x)
-    if isinstance(x, int) or (x == int(x) and abs(x) < 1e6):
-        return str(int(x))
-    return f"{x:.{digits}g}".replace("-", "\N{MINUS SIGN}")
-
-
-def value(x: Any, unit: str = "") -> str:
-    """A quantity of the reproduction table: a number, a vector or yes/no, with its unit."""
-    if x is None:
-        return "no value"
-    if unit == YES_NO:
-        return "yes" if x else "no"
-    text = f"({', '.join(number(axis) for axis in x)})" if isinstance(x, list) else number(x)
-    return f"{text} {unit}".strip()
-
-
-def brief(x: Any, unit: str = "", digits: int = 5) -> str:
-    """A value or several in a line: numbers with their units, named where there are several."""
-    if isinstance(x, Mapping):
-        named = ((evidence.split(key), item) for key, item in x.items())
-        return "; ".join(f"{name} {brief(item, own or unit, digits)}" for (name, own), item in named)
-    if isinstance(x, list):
-        return ", ".join(brief(item, unit, digits) for item in x)
-    if isinstance(x, bool):
-        return "yes" if x else "no"
-    return f"{number(x, digits)} {unit}".strip() if isinstance(x, int | float) else str(x)
 
 
 def as_yaml(x: Any) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
+from airground_drake.report.quantities import YES_NO
 from airground_drake.scenario.schema import Reproduction, Scenario
 from airground_drake.sim.collisions import first_collisions
 from airground_drake.sim.trace import Trace
@@ -26,7 +27,6 @@ STILL_S = 1.0
 # A trigger counts as at the threshold if the decision variable is at most this much below: event isolation.
 TRIGGER_TOLERANCE_M = 1e-5
 SHIFTED_M = 0.1  # a path that leaves its straight line by this is shifted
-YES_NO = "yes/no"  # unit of a row that is compared exactly
 
 MEASURES: dict[str, Measure] = {}  # measures by name; `@measure` adds one
 # By measure, what the reason of a row tells of the run at hand; `@detail_of` adds one.

@@ -7,15 +7,17 @@ Scalars are read by the rules of YAML 1.2 (`1e-3` is a number, `yes` and `1:30` 
 from __future__ import annotations
 
 import difflib
+import io
 import itertools
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import yaml
+from yaml.composer import Composer
 
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError, short
@@ -60,18 +62,24 @@ class Document(NamedTuple):
         return self.where(*at[:-1], key=key) if at else self.source
 
 
-class _Loader(yaml.BaseLoader):
+class _Bounded(Composer):
     """Composes nodes, tags scalars by the rules of YAML 1.2, and refuses nodes that are too large or too deep."""
 
+    parser: ClassVar[Any]
+    peek_event: ClassVar[Any]  # of the parser
+
     def __init__(self, text: str, source: str) -> None:
-        super().__init__(text)
-        self.name, self.depth = source, 0
+        stream: Any = io.StringIO(text)
+        stream.name = source  # which the marks have
+        self.parser.__init__(self, stream)
+        self.anchors: dict[str, yaml.Node] = {}
+        self.depth = 0
         # Numbers of values and of levels in each node, with aliases and merges expanded.
         self.sizes: dict[int, tuple[int, int]] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
         """A node and those within it."""
-        event: yaml.Event = self.peek_event()  # type: ignore[no-untyped-call]
+        event: yaml.Event = self.peek_event()
         self.depth += 1
         if self.depth > MAX_DEPTH:
             raise _excess(_where(event), deep=True)
@@ -89,13 +97,25 @@ class _Loader(yaml.BaseLoader):
         return node
 
 
+class _Loader(_Bounded, yaml.BaseLoader):
+    """In Python: its errors tell more."""
+
+    parser = yaml.BaseLoader
+
+
+class _FastLoader(_Bounded, getattr(yaml, "CBaseLoader", yaml.BaseLoader)):  # type: ignore[misc]
+    """By libyaml, where PyYAML is built with it."""
+
+    parser = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+
+
 class _Dumper(yaml.SafeDumper):
     """Quotes text that YAML 1.1 or 1.2 would read as another type."""
 
 
 for _name, (_pattern, _) in _SCALARS.items():
     if _pattern is not None:
-        for _each in (_Loader, _Dumper):
+        for _each in (_Loader, _FastLoader, _Dumper):
             _each.add_implicit_resolver(TAG + _name, re.compile(rf"(?:{_pattern})\Z"), None)
 
 
@@ -146,8 +166,12 @@ def parsed(text: str, source: str, at: tuple[str, ...] = ()) -> Document:
 
 def _composed(text: str, source: str) -> yaml.Node:
     """The root node of a YAML document; the marks of all nodes have the source's name."""
+    root: yaml.Node | None
     try:
-        root: yaml.Node | None = _Loader(text, source).get_single_node()
+        try:
+            root = _FastLoader(text, source).get_single_node()
+        except (yaml.YAMLError, ValueError, OverflowError):
+            root = _Loader(text, source).get_single_node()
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         if isinstance(error, yaml.MarkedYAMLError) and (slip := hints.slip(error, text)):
             raise ScenarioError(f"{source}:{slip.line}", "", Fault(f"not YAML: {slip.what}"), slip.wanted) from None

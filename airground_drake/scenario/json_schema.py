@@ -171,6 +171,9 @@ def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
         if part == NAMES:
             inner = says["propertyNames"]["anyOf"][0]
         says = inner or says.get("items") or says.get("additionalProperties") or {}
-        says = next((kind for kind in says.get("anyOf", ()) if kind.keys() & {"$ref", "oneOf"}), says)  # else null
+        options = says.get("anyOf", ())
+        says = next((kind for kind in options if kind.keys() & {"$ref", "oneOf"}), says)  # else null
+        if {"type": "null"} in options and says.get("anyOf"):
+            says = next(kind for kind in options if kind["type"] != "null")
         says = whole["$defs"][says["$ref"].rpartition("/")[2]] if "$ref" in says else says
     return says, name

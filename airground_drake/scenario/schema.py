@@ -25,9 +25,11 @@ from airground_drake.base.registry import (
     UGV_CONTROLLERS,
 )
 from airground_drake.base.values import (
+    Chance,
     Count,
     CountFromZero,
     Heading,
+    Loss,
     Name,
     NotNegative,
     Positive,
@@ -71,6 +73,7 @@ SHAPES = ("polygon_m", "segment_m", "size_m")
 ABOUT = ("size_m",)
 """Those of them that are about its position, which they need."""
 
+ERRORS: tuple[str, ...] = ("drawn", "adversarial", "away", "sideways")
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
 UNNAMED = "uav"
@@ -79,10 +82,11 @@ SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 OPTIONAL: dict[str, object] = {
-    "ugv_controller": None, "uav": None, "uavs": {}, "ugvs": [], "lost_at_s": 0.0, "uav_m": 0.0,
+    **dict.fromkeys(("channel", "ugv_controller", "sensing", "uav")), "uavs": {}, "ugvs": [], "lost_at_s": 0.0,
+    "uav_m": 0.0,
 }  # fmt: skip
 """Keys that may be left out, and their values then: a scenario is written and digested as if these did not exist."""
-SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
+SETTABLE: tuple[str, ...] = ("channel", "decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
 
@@ -318,6 +322,28 @@ class Control:
 
 
 @dataclass(slots=True)
+class Sensing:
+    """Measured positions: each robot publishes one, off by a bounded error, and all robots and gatekeepers act on it.
+
+    The law keeps as much more as that costs (`airground budget`), and robots stand where measured inequalities
+    contradict one another. 'drawn' errors change smoothly. 'adversarial' ones are at the bound: the nearest thing looks
+    farther ('away') or is seen in another direction ('sideways'), by turns of half a second. Beside obstacles that may
+    move nothing is promised then, and a scenario with both is refused.
+    """
+
+    position_error_m: NotNegative = 0.0
+    """Largest error of a robot's published position."""
+    errors: Annotated[Words, one_of(ERRORS)] = "drawn"
+    """How they come."""
+    correlation_s: Positive = 1.0
+    """Time after which a drawn error is a new one; in between it is linear."""
+    uav_error_m: NotNegative = 0.0
+    """Largest error of a UGV's position that the UAV plans with, drawn; no distance rests on it."""
+    seed: CountFromZero = 0
+    """Seed of the errors."""
+
+
+@dataclass(slots=True)
 class OwnController:
     """A controller of the user's own for all UGVs, a Drake System with the outputs of the package's.
 
@@ -462,6 +488,51 @@ class Gatekeeper:
 
 
 @dataclass(slots=True)
+class WayBack:
+    """The way from UGVs to the UAV where it differs from the way there: what is left out is as there."""
+
+    delay_s: NotNegative | None = None
+    """How late every message is."""
+    jitter_s: NotNegative | None = None
+    """By how much more a message may be late, uniformly."""
+    loss: Loss | None = None
+    """Share of messages that are lost."""
+    burst_s: NotNegative | None = None
+    """Mean duration of a loss; 0: each message is lost for itself."""
+    duplicate: Chance | None = None
+    """Share of messages that arrive twice."""
+    reorder: YesNo | None = None
+    """Whether a message may overtake another one."""
+
+
+@dataclass(slots=True)
+class Channel:
+    """What happens to messages between UAV and UGVs. Without it they arrive at once, and none is lost.
+
+    The fate of a message depends on `seed`, its link, its number and how often it was sent before, and on nothing else:
+    with another delay the same messages are lost. Who waits for an answer repeats the message after twice the delay,
+    the jitter and 0.15 s. Robots see each other as they are: distances do not depend on messages.
+    """
+
+    delay_s: NotNegative = 0.0
+    """How late every message is."""
+    jitter_s: NotNegative = 0.0
+    """By how much more a message may be late, uniformly."""
+    loss: Loss = 0.0
+    """Share of messages that are lost."""
+    burst_s: NotNegative = 0.0
+    """Mean duration of a loss; 0: each message is lost for itself."""
+    duplicate: Chance = 0.0
+    """Share of messages that arrive twice."""
+    reorder: YesNo = True
+    """Whether a message may overtake another one."""
+    seed: CountFromZero = 1
+    """Decides which messages are lost, doubled and late."""
+    up: WayBack | None = None
+    """The way back, from UGVs to the UAV; by default it is as the way there."""
+
+
+@dataclass(slots=True)
 class Run:
     """One simulation: a method (see `airground list methods`) and what is expected of it.
 
@@ -590,12 +661,16 @@ class Scenario:
     """The controllers."""
     ugv_controller: OwnController | None = None
     """A controller of your own, in place of the package's."""
+    sensing: Sensing | None = None
+    """Errors of measured positions."""
     decision: Decision = field(default_factory=Decision)
     """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)
     """The UAV's intervention behaviours."""
     gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
     """The UGVs' decisions about proposals."""
+    channel: Channel | None = None
+    """What happens to messages; by default they arrive at once."""
     runs: Annotated[dict[Name, Run], Field(min_length=1)] = field(kw_only=True)
     """The simulations, by name."""
     claims: Annotated[dict[Words, Words], CLAIMS] = field(default_factory=dict)
@@ -616,6 +691,11 @@ class Scenario:
         """SHA-256 of the scenario as nested dicts and lists in strict JSON, with all defaults and without spaces."""
         text = json.dumps(self.data(), separators=(",", ":"), allow_nan=False)
         return sha256(text.encode())
+
+    @property
+    def position_error_m(self) -> float:
+        """Bound of the error of a robot's published position, m; 0 without errors."""
+        return self.sensing.position_error_m if self.sensing else 0.0
 
     @property
     def barriers(self) -> dict[str, Obstacle]:

@@ -61,6 +61,11 @@ def _uavs(scenario: Scenario) -> Problems:
     for name, uav in scenario.uavs.items():
         if uav.name != name:
             yield f"uavs.{name}.name", uav.name, f"{name}, its key, or no name"
+    if scenario.channel is not None and len(scenario.aerial) > 1:
+        yield "channel", Fault("there are several UAVs"), "wanted: one UAV, or no channel"
+    for name, uav in scenario.aerial.items() if scenario.channel is not None else ():
+        if uav.lost_at_s:
+            yield f"{scenario.key_of(name)}.lost_at_s", uav.lost_at_s, "0: with a channel no UAV is lost"
     if len(scenario.aerial) > 1 and not scenario.safe_distance.uav_m:
         yield "safe_distance.uav_m", Fault("missing"), "wanted: the distance between two UAVs, a number above 0 in m"
 
@@ -504,9 +509,7 @@ def _clearances(scenario: Scenario) -> Problems:
 
 
 def _too_near(robot: _Round, attribute: str, what: str, kind: str, least: float) -> tuple[str, object, str]:
-    message = f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
-    message = f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
-    return f"{robot.key}.{attribute}", robot.point, message
+    return f"{robot.key}.{attribute}", robot.point, f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
 
 
 def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -> Iterator[tuple[_Round, _Round]]:
@@ -519,6 +522,26 @@ def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -
     for i, j in np.argwhere(apart < distance + np.add.outer(radii, other_radii)).tolist():
         if these is not those or j < i:
             yield these[i], those[j]
+
+
+def _measured(scenario: Scenario) -> Problems:
+    """The law bears the errors of measured positions: its gain is large enough, and nothing may move by itself."""
+    if not (error_m := scenario.position_error_m):
+        return
+    key, control = "sensing.position_error_m", scenario.control
+    for name, barrier in scenario.barriers.items():
+        if barrier.expected_speed_m_s:
+            yield key, error_m, f"0: {name} may move, and nothing is promised beside it where positions are measured"
+    for run, spec in scenario.runs.items():
+        if spec.composition != "augmented":
+            yield f"runs.{run}.composition", spec.composition, f"augmented: robots stand where {key} asks for it"
+    for pair in budget(scenario):
+        share = decimal(control.avoidance_gain_1_s) * decimal(control.period_s)
+        if share < pair.least_gain:
+            both = " (each may have to stand for the other)" if pair.second in scenario.robots else ""
+            why = f"{pair.promised_m:.9g} m between {pair.first} and {pair.second} with errors of {error_m:.9g} m{both}"
+            needed = _shown(Fraction(pair.least_gain) / decimal(control.period_s), ROUND_CEILING)
+            yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"at least {needed} 1/s for {why}"
 
 
 def _budget(scenario: Scenario) -> Problems:
@@ -550,7 +573,8 @@ def _budget(scenario: Scenario) -> Problems:
             if apart < pair.gap_m - TOLERANCE:
                 yield key, Fault(needs), f"they {verb} {apart:.2f} m apart. Largest term: {pair.largest}"
         speed = other.expected_speed_m_s if other else robots[pair.second].max_speed_m_s
-        reach = pair.law_m + (robots[pair.first].max_speed_m_s + speed) * period
+        unsure_m = scenario.position_error_m * (2.0 if pair.second in robots else 1.0)
+        reach = pair.law_m + unsure_m + (robots[pair.first].max_speed_m_s + speed) * period
         if scenario.control.sensing_range_m < reach:
             allowed = (
                 f"control.sensing_range_m must be at least {reach + TOLERANCE:.9g} m. Largest term: {pair.largest}"
@@ -598,5 +622,5 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
     _uavs, _charges, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains,
-    _periods, _release, _distances, _sensing, _extent, _clearances, _budget, _reproduction, _choices,
+    _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget, _reproduction, _choices,
 )  # fmt: skip

@@ -23,7 +23,6 @@ from airground_drake.uav.database import Asked, BehaviourDatabase, Negotiation
 from airground_drake.uav.messages import (
     ACCEPT,
     DONE,
-    JOINT_REFUSED,
     REFUSE,
     SILENT,
     STALLS,
@@ -136,6 +135,7 @@ class Planner:
     sender: Sender = ONLY  # the UAV
     charge: tuple[bool, ...] = ()  # per UGV, whether the UAV is in charge of it; default: of all
     lost_at: float = np.inf  # from this time on the UAV neither sends nor hears anything, s
+    lead: float = 0.0  # time that a proposal is under way, s
 
     @property
     def radii(self) -> Array:
@@ -242,7 +242,7 @@ class Planner:
                 continue
             seen = Observation(
                 t=t,
-                start=t + self.period,
+                start=t + self.period + self.lead,
                 robot=robot,
                 position=positions[i],
                 target=self.targets[i],
@@ -295,20 +295,18 @@ class Planner:
         """Negotiations after the UGVs' answers."""
         # A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
         # its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
-        # trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
-        # asked again at once. If a UGV that may fall behind would have stalled, or was left behind, its motion was too
-        # fast.
+        # trajectory goes on: the others' ways were planned with it. Those that did not refuse are asked again at once.
+        # If a UGV that may fall behind would have stalled, or was left behind, its motion was too fast.
         called = {name for name, active in zip(self.ugvs, intervening, strict=True) if active}
-        own = [a == REFUSE and report.reason != JOINT_REFUSED for a, report in zip(said, reports, strict=True)]
-        refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}
+        refused = {talk.proposal.joint for talk, a in zip(talks, said, strict=True) if talk.proposal and a == REFUSE}
         after = []
-        for i, (name, talk, answer, refuses) in enumerate(zip(self.ugvs, talks, said, own, strict=True)):
+        for i, (name, talk, answer) in enumerate(zip(self.ugvs, talks, said, strict=True)):
             proposal, trails = talk.proposal, bool(self.trails and self.trails[i])
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
             party = proposal.party if proposal else ()
             if called.isdisjoint((name, talk.cause, *party)):
                 talk = Negotiation()
-            elif refuses or (answer == REFUSE and not party_refused):
+            elif answer == REFUSE:
                 talk = self.database.after_refusal(
                     talk, t, learnt=learnt, too_fast=trails and reports[i].reason == STALLS
                 )

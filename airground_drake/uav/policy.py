@@ -145,6 +145,7 @@ class Proposal:
         cause: name of the UGV whose trigger led to the proposal. If it names another UGV, this one is asked to make
             way for it. Empty: this UGV.
         party: names of all UGVs in the same joint plan; empty: the proposal stands alone.
+        beside: what the same joint plan asks of the others, by name, so that a UGV needs no other message to judge it.
         number: identifies the proposal in the UGV's answer. `planner.sent_after` gives it; before that it is -1.
         sender: name of the UAV that sends it, as `planner.sent_after` gives it.
     """
@@ -156,6 +157,7 @@ class Proposal:
     mapped: Array = field(default_factory=lambda: outline.stacked([]))
     cause: str = ""
     party: tuple[str, ...] = ()
+    beside: tuple[tuple[str, Motion], ...] = ()
     number: int = -1
     sender: str = ""
 

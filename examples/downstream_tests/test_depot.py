@@ -50,7 +50,7 @@ def test_the_carts_keep_their_distances_and_arrive(airground_trace):
 
 
 def test_without_the_uav_the_pallet_stops_the_first_cart(airground_trace):
-    with pytest.raises(ClaimError, match=r"LIVE-GOAL is refuted.*\n.*\n  who: cart1"):
+    with pytest.raises(ClaimError, match=r"LIVE-GOAL is refuted.*\n.*\n  found: cart1"):
         assert_holds(airground_trace(DEPOT, "a"), "LIVE-GOAL")
 
 

@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from airground_drake.base.errors import AirgroundError, TraceError
-from airground_drake.base.parallel import processors, run_parallel, start_in_process
+from airground_drake.base.parallel import processes, run_parallel
 
 
 def test_results_are_in_order_and_come_from_other_processes_where_these_are_of_use() -> None:
@@ -34,15 +34,6 @@ def test_an_exception_of_a_piece_is_raised_and_so_is_a_death() -> None:
         run_parallel([os.getpid, broken], jobs=2)
     with pytest.raises(AirgroundError, match="died"):
         run_parallel([partial(os._exit, 0), os.getpid], jobs=2)
+    with pytest.raises(AirgroundError, match="died"), processes(1) as pool:
+        pool.submit(os._exit, 0).result()
     assert len(run_parallel([os.getpid] * 2, jobs=2)) == 2
-
-
-def test_started_work_is_done_elsewhere_and_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    returned = start_in_process(os.getpid)
-    assert (returned() == os.getpid()) is (processors() == 1)
-    monkeypatch.setattr("airground_drake.base.parallel.processors", lambda: 2)
-    returned = start_in_process(partial(os._exit, 3))
-    with pytest.raises(AirgroundError, match=r"died .*\(exit code 3\)"):
-        returned()
-    monkeypatch.setattr("airground_drake.base.parallel.processors", lambda: 1)
-    assert start_in_process(os.getpid)() == os.getpid()

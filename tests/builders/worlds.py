@@ -9,7 +9,12 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.world import Body, Neighbours, World
 from airground_drake.model.geometry import outline
+from airground_drake.model.law.avoidance import Avoidance
+from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.model.plants.first_order import FirstOrder
+from airground_drake.model.plants.plant import Plant
+
+PERIOD_S = 0.05
 
 
 def world(
@@ -47,6 +52,23 @@ def world(
         for k, (place, size) in enumerate(zip(places, fixed, strict=True))
     ]
     return World((*robots, *stones), {frozenset(("ugv",)): ugv_m, frozenset(("ugv", "uav")): air_ground_m})
+
+
+def beside_a_wall(seed: int, plant: Plant, near: bool) -> tuple[Array, Array, float, float]:
+    """What the law commands a robot to do, whatever its task asks for, on one side of a wall along y, or close to it.
+
+    Returns:
+        Command (3,), m/s; the speed that the task asks for, (3,), m/s; heading, rad; way to the wall that is left, m.
+    """
+    rng, rows = np.random.default_rng(seed), outline.stacked([outline.prism([[0.0, -9.0], [0.0, 9.0]], gap=0.5)])
+    robot = Body("robot", "ugv", np.zeros(3), plant=plant, max_speed_m_s=1.0)
+    around = World((robot, Body("wall", "obstacle", np.zeros(3), rows)), {}, 3.0).around(slice(0, 1))
+    left_m = float(rng.uniform(0.0, 0.1 if near else 9.0))
+    place = np.array([[around.distance[0, 0] + left_m, 0.0, 0.0]])
+    heading, wish = rng.uniform(-np.pi, np.pi, 1), np.append(rng.uniform(-2.0, 2.0, 2), 0.0)
+    law = UgvLaw(Avoidance(3.0, PERIOD_S), 1.0, 1.0, False)
+    command = law.velocity(place, around, place, wish[None], [None], (heading, plant.steering[None]))[0]
+    return command, wish, float(heading[0]), left_m
 
 
 def among_points(robots: Array, points: Array, safe: Array, share: Array, mobility: Array) -> tuple[Array, Neighbours]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from airground_drake.sim.trace import Trace
+from oracles.channel import wrong_carriage
 from oracles.commands import wrong_commands
 from oracles.communication import wrong_messages
 from oracles.decisions import wrong_decisions
@@ -24,6 +25,7 @@ ORACLES: dict[str, Callable[[Trace], list[Fault]]] = {
     "progress": wrong_answers,
     "communication": wrong_messages,
     "protocol": wrong_executions,
+    "channel": wrong_carriage,
     "inputs": wrong_inputs,
     "decisions": wrong_decisions,
 }

@@ -14,8 +14,9 @@ from airground_drake.verify.runs.demands import outlines_of
 from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import carried
 from airground_drake.verify.runs.proposals import proposals_of
+from oracles.channel import has_channel
 from oracles.fault import Fault
-from oracles.protocol import answers_to, lost_s, parties, withdrawn_s
+from oracles.protocol import answers_to, known_answers, lost_s, parties, withdrawn_s
 from oracles.sensing import are_same, are_there, beyond_range, still_parts
 
 SENSED_M = 1e-9
@@ -41,7 +42,9 @@ def _out_of_turn(trace: Trace) -> Iterator[Fault]:
         begins, ends = spans[:, 0] - TIME_TOLERANCE_S, spans[:, 1] + allowance + TIME_TOLERANCE_S
         if lost_s(trace, sent) <= sent.times_s[-1]:
             ends = np.maximum(ends, sent.times_s[-1] + allowance)
-        messages = [("proposal", sent.issued_s), *(("decision", answer.t_s) for answer in answers_to(trace, sent))]
+        messages = [("proposal", sent.issued_s)]
+        if not has_channel(trace):
+            messages += [("decision", answer.t_s) for answer in answers_to(trace, sent)]
         if wrong := [(kind, t) for kind, t in messages if not ((t >= begins) & (t <= ends)).any()]:
             yield Fault(f"{wrong[0][0]} while nobody needs it", sent.ugv, wrong[0][1])
 
@@ -107,6 +110,8 @@ def _told(trace: Trace, every: list[Part], uav: str) -> tuple[dict[Part, float],
         read = dict[float, float]()  # by time of the last answer before a planning instant
         for k in range(round(sent.issued_s / period) + 1, int(end / period + 1e-6) + 1):
             before = [answer.t_s for answer in answers_to(trace, sent) if answer.t_s < k * period - TIME_TOLERANCE_S]
+            if has_channel(trace):
+                before = [answer.t_s for answer in known_answers(trace, sent, k * period)]
             if before:
                 read.setdefault(before[-1], k * period)
         for answer in answers_to(trace, sent):

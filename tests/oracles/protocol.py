@@ -12,6 +12,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.instants import GATED_METHODS, row_at
 from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of
+from oracles.channel import has_channel, heard, held
 from oracles.fault import Fault
 
 
@@ -49,13 +50,18 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
     """Messages of the trace that are not those of its proposals and decisions, or not withdrawn when they should be."""
     table, ends = trace.messages, trace.t[-1] - TIME_TOLERANCE_S
     of = {kind: table[table["kind"] == kind] for kind in ("proposal", "withdrawal", "answer")}
-    if sorted(of["answer"]["number"]) != [*range((trace.decisions["answer"] >= 0).sum())]:
+    told = trace.decisions["answer"][trace.decisions["answer"] >= 0]
+    numbers = sorted({*of["answer"]["number"]} if has_channel(trace) else of["answer"]["number"])
+    lacking = {*told} - {*numbers} if has_channel(trace) else len(told) != len(numbers)
+    if numbers != [*range(len(numbers))] or lacking:
         yield Fault("answers are not those of the decisions")
     period_s, read = trace.scenario.intervention.period_s, of["answer"].dropna(subset="read_s")
     waited_s = (read["read_s"] - read["sent_s"]).to_numpy(dtype=np.float64)
+    if has_channel(trace):
+        waited_s = np.zeros(0)  # see `oracles.channel`
     if ((waited_s <= 0.0) | (waited_s > max(period_s, trace.scenario.gatekeeper.period_s) + TIME_TOLERANCE_S)).any():
         yield Fault("answers are not read at the next planning instant")
-    withdrawn = dict(zip(of["withdrawal"]["about"].tolist(), of["withdrawal"]["sent_s"].tolist(), strict=True))
+    withdrawn = of["withdrawal"].groupby("about")["sent_s"].min().to_dict()
     for sent in proposals_of(trace):
         if sent.number not in {*of["proposal"]["number"]}:
             yield Fault("a proposal is no message", sent.ugv, sent.issued_s)
@@ -81,7 +87,7 @@ def _misused(trace: Trace) -> Iterator[Fault]:
             yield Fault("sent for a UGV that is not intervened on", sent.ugv, sent.issued_s, sent.cause)
         if missing := {*sent.party} - {sent.ugv, *(part.ugv for part in parts_of(trace, sent))}:
             yield Fault("part of a joint plan not sent", sent.ugv, sent.issued_s, sorted(missing))
-        end = withdrawn_s(trace, sent)
+        end = held_until(trace, sent)
         if late := [answer.t_s for answer in answers_to(trace, sent) if answer.t_s > end + TIME_TOLERANCE_S]:
             yield Fault("decision on what was withdrawn", sent.ugv, late[0], end)
     for ugv in trace.ugvs:
@@ -125,8 +131,7 @@ def executed_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
     """The proposal that a UGV should execute, at each control sample of the run, or None.
 
     A proposal is in force from its sending until it is withdrawn (`withdrawn_s`). Under method (b) it is executed all
-    that time; under (c) and (d) while the gatekeeper's last decision accepts it. A part of a joint plan is executed
-    only while every other part in force is accepted or done.
+    that time; under (c) and (d) while the gatekeeper's last decision accepts it.
     """
 
     def found() -> list[ProposalRecord | None]:
@@ -140,21 +145,21 @@ def executed_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
 
 
 def _in_force(trace: Trace, sent: ProposalRecord, now: float) -> bool:
-    """Whether a proposal was in force after the last planning instant up to `now`, s."""
+    """Whether a proposal was in force after the last planning instant up to `now`, s; with a channel, for its UGV."""
+    if has_channel(trace):
+        begin, end = held(trace, sent)
+        return begin <= now + TIME_TOLERANCE_S < end
     period = trace.scenario.intervention.period_s
     planned = period * np.floor(now / period + 1e-6) + TIME_TOLERANCE_S
     return bool(sent.issued_s <= planned < withdrawn_s(trace, sent))
 
 
 def _is_accepted(trace: Trace, sent: ProposalRecord, now: float) -> bool:
-    """Whether a proposal in force is accepted at `now`, s, and all other parts in force are accepted or done."""
+    """Whether a proposal in force is accepted at `now`, s."""
     if trace.meta["method"] not in GATED_METHODS:
         return True
     own = _answer_at(trace, sent, now)
-    if own is None or not own.accepted:
-        return False
-    others = [_answer_at(trace, part, now) for part in parts_of(trace, sent) if _in_force(trace, part, now)]
-    return not any(answer is None or answer.refused for answer in others)
+    return own is not None and own.accepted
 
 
 def _answer_at(trace: Trace, sent: ProposalRecord, now: float) -> Answer | None:
@@ -204,6 +209,19 @@ def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = F
     return trace.derived(("withdrawn", sent.number, unless_replaced), first)
 
 
+def held_until(trace: Trace, sent: ProposalRecord) -> float:
+    """When a UGV learns that a proposal is taken back, s."""
+    return held(trace, sent)[1] if has_channel(trace) else withdrawn_s(trace, sent)
+
+
+def known_answers(trace: Trace, sent: ProposalRecord, now: float) -> list[Answer]:
+    """The decision about a proposal that the UAV knows of at a planning instant, s, over a channel; [] if none."""
+    last = heard(trace, sent.ugv, now)
+    table = trace.decisions
+    (t,) = table.loc[table["answer"] == last["number"], "t_s"].tolist() or [None] if last else [None]
+    return [answer for answer in answers_to(trace, sent) if answer.t_s == t]
+
+
 def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> tuple[float, bool]:
     """When a proposal is taken back without regard to other parts, s, and whether the UAV has its refusal then."""
     t, period = trace.t, trace.scenario.intervention.period_s
@@ -214,6 +232,8 @@ def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> 
         now = k * period
         row = row_at(trace, now)
         before = [answer for answer in answers_to(trace, sent) if answer.t_s < now - TIME_TOLERANCE_S]
+        if has_channel(trace):
+            before = known_answers(trace, sent, now)
         refused = bool(before) and before[-1].refused
         # the clock's rounding decides whether a motion that ends at this very instant has run out
         ended = t[row] >= sent.times_s[-1] or (bool(before) and before[-1].done)

@@ -11,6 +11,8 @@ UNLIMITED = np.array([0.0, np.inf, 0.0, np.inf, np.nan])
 """The numbers of a robot that does not turn: hand point, m, turning limit, rad/s, wheel base, m, wheel speed, m/s, and
 the largest angle of a command to the heading, rad; NaN: any."""
 HALVINGS = 60
+OUTSIDE_M_S = 1e-12
+"""A command outside what a robot can follow by no more is on its edge but for rounding, m/s."""
 
 
 def numbers_of(trace: Trace, ugv: str) -> Array:
@@ -50,7 +52,9 @@ def able(command: Array, heading: Array, numbers: Array, period_s: float) -> Arr
     """Commands (B, 3), m/s, shortened as far as the limits (B, 5) of robots with headings (B,), rad, ask for."""
     numbers, heading = np.broadcast_to(numbers, (len(command), 5)), np.broadcast_to(heading, len(command))
     normal, bound = edges(heading, numbers)
-    command = np.where((np.einsum("bkd,bd->bk", normal, command) < bound).any(axis=1)[:, None], 0.0, command)
+    command = np.where(
+        (np.einsum("bkd,bd->bk", normal, command) < bound - OUTSIDE_M_S).any(axis=1)[:, None], 0.0, command
+    )
     turns = np.flatnonzero(numbers[:, 0] > 0.0)
     if not len(turns):
         return command

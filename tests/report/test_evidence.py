@@ -7,7 +7,7 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.report import evidence, html
+from airground_drake.report import evidence
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -33,7 +33,6 @@ def test_values_records_and_records_by_name() -> None:
             "robots": {"ugv_1": {"count": 2}},
         },
         "X",
-        html.number,
     )
     assert [table.caption for table in found] == ["X", "X: pairs", "X: robots"]
     assert found[0].rows == (("tolerance, m", "0.125"), ("agrees", "yes"), ("point, m", "(1, 2)"))
@@ -43,7 +42,7 @@ def test_values_records_and_records_by_name() -> None:
 
 
 def test_long_tables_and_long_cells_are_cut() -> None:
-    rows, cell = evidence.tables({"rows": [{"x": k} for k in range(90)], "y": "y" * 500}, "X", html.number)[::-1]
+    rows, cell = evidence.tables({"rows": [{"x": k} for k in range(90)], "y": "y" * 500}, "X")[::-1]
     assert len(rows.rows) == evidence.MAX_ROWS
     assert "50 more rows" in rows.caption
     assert cell.rows[0][1].endswith("…")
@@ -51,6 +50,6 @@ def test_long_tables_and_long_cells_are_cut() -> None:
 
 @given(st.dictionaries(st.text(), JSON, max_size=5))
 def test_any_json_is_shown(found: dict[str, object]) -> None:
-    for table in evidence.tables(json.loads(json.dumps(found)), "X", html.number):
+    for table in evidence.tables(json.loads(json.dumps(found)), "X"):
         assert all(len(row) == len(table.columns) for row in table.rows)
         assert all(isinstance(cell, str) for row in table.rows for cell in row)

@@ -36,7 +36,7 @@ def test_bytes_do_not_depend_on_the_time_or_the_user(
 
 def test_every_panel_is_named_small_and_has_its_data(drawn: list[Figure]) -> None:
     assert {f.id: len(f.panels) for f in drawn} == {
-        "trajectories": 2, "distances": 2, "timelines": 2, "recursion": 1,
+        "trajectories": 2, "distances": 2, "timelines": 2, "audit-1": 1,
     }  # fmt: skip
     panels = [panel for figure in drawn for panel in figure.panels]
     for panel in panels:

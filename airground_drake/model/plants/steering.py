@@ -33,6 +33,7 @@ from airground_drake.base.compiling import njit
 HAND, TURN, HALF_BASE, WHEEL, FORWARD, RADIUS = 0, 1, 2, 3, 4, 5
 NUMBERS = 6
 EDGES = 2  # most half-planes that bound the commands that a robot can follow
+OUTSIDE_M_S = 1e-12  # a command outside such a half-plane by no more is on its edge but for rounding, m/s
 BISECTIONS = 50  # halvings in the search for a share that the wheels can do; the result always can be done
 
 
@@ -83,7 +84,7 @@ def steer(velocity: Array, heading: float, steering: Array, period: float) -> tu
     edge = np.empty(3)
     for side in range(_edges(steering)):
         _edge(heading, steering, side, edge)
-        if velocity[0] * edge[0] + velocity[1] * edge[1] < 0.0:
+        if velocity[0] * edge[0] + velocity[1] * edge[1] < -OUTSIDE_M_S:
             velocity[:] = 0.0
             return 0.0, 0.0
     left = share(velocity[0] * cos + velocity[1] * sin, velocity[1] * cos - velocity[0] * sin, steering, period)

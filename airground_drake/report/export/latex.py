@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from airground_drake.base.statuses import NOT_EXERCISED, outcome
 from airground_drake.report.model import Report
+from airground_drake.report.quantities import told
 
 _SPECIAL = {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}",
     ">": r"\textgreater{}", "|": r"\textbar{}", **{character: f"\\{character}" for character in "&%$#_{}"},
     "○": r"$\circ$", "●": r"$\bullet$", "\N{MULTIPLICATION SIGN}": r"$\times$", "✖": r"$\times$", "□": r"$\square$",
     "◆": r"$\blacklozenge$", "▲": r"$\blacktriangle$", "▼": r"$\blacktriangledown$", "…": r"\ldots{}",
+    "\N{MINUS SIGN}": "$-$", "\N{EN DASH}": "--",
 }  # fmt: skip
 
 
@@ -37,20 +38,10 @@ def verdicts(report: Report) -> str:
 def reproduction(report: Report) -> str:
     """A table with a row per result of the paper: its value there, here, and whether it was reproduced."""
     rows = [
-        [row.id, row.quantity, _value(row.paper, row.unit), _value(row.ours, row.unit), row.status.replace("_", " ")]
+        [row.id, row.quantity, told(row.paper, row.unit), told(row.ours, row.unit), row.status.replace("_", " ")]
         for row in report.reproduction
     ]
     return _table(["", "quantity", "paper", "ours", ""], r"lp{0.45\linewidth}lll", rows)
-
-
-def _value(value: Any, unit: str) -> str:
-    """A value of the reproduction with its unit."""
-    if value is None:
-        return "none"
-    if unit == "yes/no":
-        return "yes" if value else "no"
-    numbers = ", ".join(f"{number:.4g}" for number in (value if isinstance(value, list) else [value]))
-    return f"({numbers}) {unit}" if isinstance(value, list) else f"{numbers} {unit}"
 
 
 def _table(head: Sequence[str], columns: str, rows: Sequence[Sequence[str]]) -> str:

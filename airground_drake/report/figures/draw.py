@@ -14,7 +14,7 @@ import numpy as np
 
 from airground_drake.base.errors import TraceError, one_line
 from airground_drake.base.registry import method_of
-from airground_drake.report.figures import comparison, maps, timelines
+from airground_drake.report.figures import findings, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
 from airground_drake.report.metrics import close_by, events_of, gap_m, radius_m
 from airground_drake.report.outcomes import Near
@@ -76,7 +76,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
         chosen = _select(scenario, traces)
         drawn = [_trajectories(chosen), _distances(chosen), _timelines(chosen)]
         drawn += [_team(chosen)] if len(chosen.first.ugvs) > MAX_TEAM else []
-        compared = comparison.draw(scenario, traces)
+        compared = findings.recursion(scenario, traces)
     counterpart = dict(zip(_NUMBERED, numbers, strict=False))
     return [
         replace(figure, title=f"{figure.title} (the paper's {counterpart[figure.id]})")

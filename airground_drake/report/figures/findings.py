@@ -1,4 +1,4 @@
-"""Pictures of findings about the paper, each from its evidence in report.json alone."""
+"""Pictures of findings about the paper: that of 1 from the runs, each other from its evidence in report.json alone."""
 
 from __future__ import annotations
 
@@ -11,16 +11,42 @@ from airground_drake.base.arrays import Array
 from airground_drake.model.trigger.bayes import decision_time, optimal_threshold
 from airground_drake.report.figures.lines import of_finding
 from airground_drake.report.figures.panels import Figure
+from airground_drake.report.figures.timelines import nearest_distance
+from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.view import canvas
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.trace import Trace
 from airground_drake.verify.finding import Chart
 
 POINTS = 200
+MAX_RUNS = 5  # runs whose distances are compared: as many as there are marks
 
 
 def draw(items: Sequence[Mapping[str, Any]]) -> list[Figure]:
     """A figure beside each finding that has a picture of its own."""
     with canvas.style():
         return [of_finding(PICTURES[item["id"]](item), item["id"]) for item in items if item["id"] in PICTURES]
+
+
+def recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
+    """Item 1: distances under (5) as printed and by the augmented projector; None unless the runs have both."""
+    printed = [name for name in traces if scenario.runs[name].composition.startswith("recursion")]
+    methods = {scenario.runs[name].method for name in printed}
+    augmented = [name for name in traces if name not in printed and scenario.runs[name].method in methods]
+    runs = {name: traces[name] for name in [*augmented, *printed][:MAX_RUNS]}
+    least = [near for trace in runs.values() for ugv in trace.ugvs if (near := closest_obstacle(trace, ugv))]
+    if not (printed and augmented and least):
+        return None
+    robot = min(least, key=lambda near: near.value_m).robot
+    lines, marks = {}, {}
+    for name, trace in runs.items():
+        how = f"{name}: {scenario.runs[name].composition.replace('_', ' ')}"
+        lines[how] = trace.t, nearest_distance(trace, robot)
+        if near := closest_obstacle(trace, robot):
+            lines["safe distance"] = np.array([0.0, trace.t[-1]]), np.full(2, near.required_m)
+            marks[f"closest, {name}"] = near.t_s, near.value_m
+    title = f"Distance of {robot} to the nearest obstacle"
+    return of_finding(Chart(title, "time, s", "distance, m", lines, marks), 1)
 
 
 def time(item: Mapping[str, Any]) -> Chart:
@@ -146,7 +172,7 @@ def _curve(value: Callable[[float], float], x: Array) -> tuple[Array, Array]:
     return x, np.array([value(point) for point in x])
 
 
-# By number of the finding. Those of 1 are drawn from runs; those of 2 and 9 are charts of claims.
+# By number of the finding. Those of 2 and 9 are charts of claims.
 PICTURES: dict[int, Callable[[Mapping[str, Any]], Chart]] = {
     3: time, 4: optimum, 5: first_passage, 6: due, 7: sides, 10: intrusion, 11: task_error, 17: speeds, 18: one_or_two,
 }  # fmt: skip

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
 from airground_drake.report.figures.clock import CUT_S, Clock
-from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
+from airground_drake.report.metrics import events_of, gap_m
 from airground_drake.report.outcomes import Near, metres
 from airground_drake.report.view.canvas import (
     ALARM,
@@ -234,33 +234,6 @@ def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
     axes.set_ylim(0.0, 1.1 * top)
     rule(axes, quantity, "UGVs")
     label_right(axes, labels)
-    return figure
-
-
-def compared_distances(runs: Mapping[str, Trace], robot: str) -> Figure:
-    """Distance from one robot to its nearest obstacle over time in several runs, with the minima."""
-    first = next(iter(runs.values()))
-    minima = {name: closest_obstacle(trace, robot) for name, trace in runs.items()}
-    d = max((minimum.required_m for minimum in minima.values() if minimum), default=0.0)
-    figure, (axes,) = _time_axes(2.58, [0.22 * len(runs)], first)
-    gaps = {name: nearest_distance(trace, robot) for name, trace in runs.items()}
-    low = min(d, *(float(gap.min()) for gap in gaps.values()))
-    bottom = max(min(0.0, low), low - 0.15 * d)
-    axes.set_ylim(bottom, 1.6 * d)
-    axes.axhspan(min(0.0, bottom), d, **_FORBIDDEN)
-    level(axes, d, "-")
-    rule(axes, "time, s", "distance to the nearest obstacle, m")
-    label_right(axes, [(d, f"d = {d:g}", INK)])
-    for position, (name, trace) in enumerate(runs.items()):
-        appearance, minimum = look(position), minima[name]
-        if minimum is None:
-            continue
-        text = f"run {short(name, 24)}: minimum {minimum.value_m:.3f} m"
-        time_line(axes, trace.t, gaps[name], appearance, label=text)
-        axes.plot(
-            minimum.t_s, minimum.value_m, marker="o", markersize=9, markerfacecolor="none", color=appearance.color
-        )
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, handlelength=4.0)
     return figure
 
 

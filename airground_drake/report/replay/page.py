@@ -13,15 +13,8 @@ from airground_drake.report.html import digest
 from airground_drake.report.replay.recording import recorded
 from airground_drake.report.replay.scene import FRAMES_PER_S, MAX_NAMED_BARRIERS, Scene
 from airground_drake.report.templating import environment_of
+from airground_drake.report.view import looks
 from airground_drake.report.view.draw import barrier_path, robot_path
-from airground_drake.report.view.looks import (
-    OBSTACLE_COLOR,
-    OUTCOME_COLORS,
-    STATE_COLORS,
-    STATE_MARKS,
-    UAV_COLOR,
-    UNSEEN_COLOR,
-)
 from airground_drake.report.view.stage import STATES
 
 MAX_EVENTS = 300  # events that are listed
@@ -47,11 +40,11 @@ _POLICY = (
 
 
 _LOOKS = {
-    "states": list(zip(STATES, STATE_MARKS, STATE_COLORS, strict=True)),
-    "outcomes": OUTCOME_COLORS,
-    "uav": UAV_COLOR,
-    "obstacle": OBSTACLE_COLOR,
-    "unseen": UNSEEN_COLOR,
+    "states": list(zip(STATES, looks.STATE_MARKS, looks.STATE_COLORS, strict=True)),
+    "outcomes": looks.OUTCOME_COLORS,
+    "uav": looks.UAV_COLOR,
+    "obstacle": looks.OBSTACLE_COLOR,
+    "unseen": looks.UNSEEN_COLOR,
 }
 
 
@@ -61,7 +54,7 @@ def _data(scene: Scene) -> dict[str, Any]:
         "title": f"{scene.scenario.name}, {'run' if scene.has_states else 'log'} {scene.run}",
         "end_s": float(scene.times_s[-1]),
         "frame_s": 1.0 / FRAMES_PER_S,
-        "marks": STATE_MARKS,
+        "marks": looks.STATE_MARKS,
         "robots": [
             {"name": body.name, "path": robot_path(k).split("/")[1:], "ugv": body.kind == "UGV"}
             for k, body in enumerate(scene.robots)

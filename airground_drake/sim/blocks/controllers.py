@@ -280,24 +280,30 @@ def read_back(near: Neighbours, avoidance: Avoidance, robots: int, sampling_s: l
     """The parameters with which a controller's avoidance runs, strict JSON, for the trace; `robots` move."""
     # Returns for its k robots: `members`, their indices in the order of the world; `outlines` of the m convex parts at
     # rest, without padding, one after the other; `moving_outlines`, those of obstacles that move, about their origins,
-    # if there are any; `others`, indices of the bodies of the n parts that each avoids besides what is at rest, (k, n);
+    # if there are any; `stands`, if robots stand where inequalities contradict one another; `others`, indices of the
+    # bodies of the n parts that each avoids besides what is at rest, (k, n);
     # `safe_m` and `share` beside the parts at rest, then beside the others, (k, m + n); `mobility` (k, 3);
     # `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset; `gain_1_s`, `period_s`, `sensing_range_m`.
     # Arrays are flat, in C order; `safe_m` and `share` are lists of [value, number of repetitions].
     moving = [number for row in near.parts[robots:] for number in outline.as_tuple(row)]
-    return ({"moving_outlines": moving} if moving else {}) | {
-        "members": near.members.tolist(),
-        "outlines": [number for row in near.still for number in outline.as_tuple(row)],
-        "others": near.carrier[near.others].ravel().tolist(),
-        "safe_m": _in_runs(near.distance),
-        "share": _in_runs(near.share),
-        "mobility": near.mobility.ravel().tolist(),
-        "max_speed_m_s": near.max_speed.tolist(),
-        "sampling_s": sampling_s,
-        "gain_1_s": avoidance.gain,
-        "period_s": avoidance.period,
-        "sensing_range_m": avoidance.sensing_range,
-    }
+    more: dict[str, Any] = {"moving_outlines": moving} if moving else {}
+    return (
+        more
+        | ({"stands": True} if avoidance.stands else {})
+        | {
+            "members": near.members.tolist(),
+            "outlines": [number for row in near.still for number in outline.as_tuple(row)],
+            "others": near.carrier[near.others].ravel().tolist(),
+            "safe_m": _in_runs(near.distance),
+            "share": _in_runs(near.share),
+            "mobility": near.mobility.ravel().tolist(),
+            "max_speed_m_s": near.max_speed.tolist(),
+            "sampling_s": sampling_s,
+            "gain_1_s": avoidance.gain,
+            "period_s": avoidance.period,
+            "sensing_range_m": avoidance.sensing_range,
+        }
+    )
 
 
 def _in_runs(array: Array) -> list[list[float]]:

@@ -15,9 +15,11 @@ from airground_drake.model.trigger.automaton import FIELDS, INTERVENING
 from airground_drake.sim.blocks.lifetime import weakly
 from airground_drake.sim.blocks.signals import Messages, components_of, declare_bodies, no_proposals
 from airground_drake.sim.blocks.ticks import Ticks
+from airground_drake.uav.channel import Transit
 from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
-from airground_drake.uav.messages import Report, sightings
+from airground_drake.uav.messages import Report, Reports, sightings
+from airground_drake.uav.outbox import answers_heard
 from airground_drake.uav.planner import Planner, PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
 
@@ -36,11 +38,15 @@ class InterventionPlanner(LeafSystem):
         in  `bodies` (3M) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
             (abstract), see `messages`. With several UAVs `proposals` of all of them (see `AllProposals`).
         out `proposals` abstract, n of Proposal or None.
+        With a channel `heard`, see `Uplink`, in place of answers and reports, and `sent`, the `PlannerState`, in place
+        of `proposals`.
     State: the last resting place of each UGV and since when, see `halts`; abstract, a `PlannerState`.
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
 
-    def __init__(self, planner: Planner, world: World, control_period: float, *, alone: bool = True) -> None:
+    def __init__(
+        self, planner: Planner, world: World, control_period: float, *, channel: bool = False, alone: bool = True
+    ) -> None:
         """Declare ports, state and the periodic update; the controllers' period is in s."""
         # alone: whether there is one UAV.
         super().__init__()
@@ -50,17 +56,24 @@ class InterventionPlanner(LeafSystem):
         self._robots = world.select(*ROBOTS)
         self._bodies = declare_bodies(self, world)
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
-        self._answers = self.DeclareVectorInputPort("answers", 2 * n)
-        self._reports = Messages(self, "reports", n, Report)
+        if channel:
+            self._heard = self.DeclareAbstractInputPort("heard", Value(Transit()))
+        else:
+            self._answers = self.DeclareVectorInputPort("answers", 2 * n)
+            self._reports = Messages(self, "reports", n, Report)
+        self._channel = channel
         self._others = None if alone else Messages(self, "proposals", n, Proposal)
         held = self.DeclareAbstractState(Value(planner.start()))
         self._memory = int(held)
-        self.DeclareAbstractOutputPort(
-            "proposals",
-            lambda: no_proposals(n),
-            weakly(self._calc_proposals),
-            prerequisites_of_calc={self.abstract_state_ticket(held)},
-        )
+        remembers = {self.abstract_state_ticket(held)}
+        if channel:
+            self.DeclareAbstractOutputPort(
+                "sent", lambda: Value(planner.start()), weakly(self._calc_sent), prerequisites_of_calc=remembers
+            )
+        else:
+            self.DeclareAbstractOutputPort(
+                "proposals", lambda: no_proposals(n), weakly(self._calc_proposals), prerequisites_of_calc=remembers
+            )
         # Drake empties this slot of the Context when time, state or an input changes
         empty = ValueProducer(allocate=lambda: Value(_Ahead()), calc=lambda _, output: output.set_value(_Ahead()))
         self._ahead = self.DeclareCacheEntry("planned ahead", empty, {self.all_sources_ticket()}).cache_index()
@@ -91,6 +104,9 @@ class InterventionPlanner(LeafSystem):
     def _calc_proposals(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self.memory(context).proposals)
 
+    def _calc_sent(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.memory(context))
+
     def _watch(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
@@ -114,6 +130,13 @@ class InterventionPlanner(LeafSystem):
         # So a step-wise environment sees what the policies are asked. If it is called again, the last result counts.
         self.get_cache_entry(self._ahead).Eval(context)[:] = [self._planned(context)]
 
+    def _answered(self, context: Context) -> tuple[Array, Reports]:
+        """The UGVs' answers, (2n,), and reports, as the UAV has them."""
+        if not self._channel:
+            return self._answers.Eval(context), self._reports.Eval(context)
+        answers, reports = answers_heard(self._heard.Eval(context), range(len(self._planner.ugvs)))
+        return np.array(answers), reports
+
     def _planned(self, context: Context) -> PlannerState | None:
         """The memory after planning at the context's time; None at another time, or if nothing changes."""
         t = context.get_time()
@@ -126,7 +149,7 @@ class InterventionPlanner(LeafSystem):
         if t < self._planner.asleep_until(before, intervening):
             return None
         bodies = self._bodies.Eval(context).reshape(-1, 3)
-        answers, reports = self._answers.Eval(context), self._reports.Eval(context)
+        answers, reports = self._answered(context)
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         moving = sightings(self._world, t, bodies)
         others = () if self._others is None else self._others.Eval(context)

@@ -64,7 +64,7 @@ def _result_of(future: Future[T], call: Callable[[], T]) -> T | None:
     with suppress(BrokenProcessPool):
         return future.result()
     for _ in range(DEATHS):
-        with suppress(BrokenProcessPool), processes(1) as executor:
+        with processes(1) as executor, suppress(BrokenProcessPool):
             return executor.submit(call).result()
     return None
 

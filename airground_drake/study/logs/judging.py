@@ -375,7 +375,8 @@ def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
     there, passes = shape.within(apart, need_m)
     below_s: list[Span] = []
     for k in np.flatnonzero(passes).tolist():
-        lowest = _lowest(shape, apart[k], apart[k + 1])
+        # Only where it is not below at an end, a step has a lowest place and a time at which it comes to be below.
+        lowest = 0.0 if there[k] and there[k + 1] else _lowest(shape, apart[k], apart[k + 1])
 
         def crossing(above: float, k: int = k, below: float = lowest) -> float:
             for _ in range(HALVINGS):

@@ -28,25 +28,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from airground_drake.base.registry import METHODS, ROUTES
 from airground_drake.model.trigger.bayes import optimal_threshold
-from airground_drake.scenario.schema import (
-    AT_END,
-    TRIGGERS,
-    Control,
-    Decision,
-    Gatekeeper,
-    Intervention,
-    Moves,
-    Obstacle,
-    Policy,
-    Preset,
-    Run,
-    SafeDistance,
-    Scenario,
-    Threshold,
-    Uav,
-    Ugv,
-    Vector,
-)
+from airground_drake.scenario import schema
 
 T = TypeVar("T")
 
@@ -64,7 +46,8 @@ APPEARANCES = (0.0, 1.5, 30.0)  # times of appearance, s, of obstacles
 OBSTACLE_SPEEDS = (1.0, 0.5, 1.7)  # speeds of obstacles that move, m/s
 # Speeds at which obstacles promise to move at most, as shares of the true one; 0: no promise of their own.
 PROMISES = (1.0, 0.0, 0.5, 1.5)
-BAYES = (Threshold("bayes"), Threshold("bayes", drift_m_s=0.5, noise_m_sqrt_s=1.0))  # thresholds by the Bayes risk
+# Thresholds by the Bayes risk.
+BAYES = (schema.Threshold("bayes"), schema.Threshold("bayes", drift_m_s=0.5, noise_m_sqrt_s=1.0))
 
 
 @lru_cache(maxsize=None, typed=True)
@@ -81,7 +64,7 @@ PARAMETERS: dict[str, dict[str, float]] = {
 
 
 @st.composite
-def policies(draw: DrawFn, names: Sequence[str] = tuple(PARAMETERS), *, at_most: int = 2) -> list[Policy]:
+def policies(draw: DrawFn, names: Sequence[str] = tuple(PARAMETERS), *, at_most: int = 2) -> list[schema.Policy]:
     """A behaviour database, without repetition.
 
     Args:
@@ -92,7 +75,7 @@ def policies(draw: DrawFn, names: Sequence[str] = tuple(PARAMETERS), *, at_most:
     chosen = draw(st.lists(st.sampled_from(names), max_size=at_most, unique=True))
     speeds = [draw(first_of(*SPEEDS)) for _ in chosen]
     return [
-        Policy(name, {"speed_m_s": speed, **PARAMETERS[name]} if name in PARAMETERS else {})
+        schema.Policy(name, {"speed_m_s": speed, **PARAMETERS[name]} if name in PARAMETERS else {})
         for name, speed in zip(chosen, speeds, strict=True)
     ]
 
@@ -107,14 +90,14 @@ def scenarios(
     ugvs: SearchStrategy[int] | None = None,
     obstacles: SearchStrategy[int] | None = None,
     methods: SearchStrategy[str] | None = None,
-    policies: SearchStrategy[list[Policy]] | None = None,
+    policies: SearchStrategy[list[schema.Policy]] | None = None,
     triggers: SearchStrategy[str] | None = None,
     routes: SearchStrategy[str] | None = None,
     durations: SearchStrategy[float] | None = None,
     compositions: SearchStrategy[str] | None = None,
     shapes: SearchStrategy[str] | None = None,
     moving: SearchStrategy[bool] | None = None,
-) -> Scenario:
+) -> schema.Scenario:
     """A valid scenario with one run, named by its method.
 
     Args:
@@ -136,7 +119,7 @@ def scenarios(
     count = draw(st.integers(1, 4) if ugvs is None else ugvs)
     method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)
     period = draw(first_of(*PERIODS))
-    safe = SafeDistance(
+    safe = schema.SafeDistance(
         obstacle_m=draw(first_of(*DISTANCES)),
         moving_m=draw(first_of(0.0, *DISTANCES)) if moving is not None else 0.0,
         ugv_m=draw(first_of(*DISTANCES)),
@@ -152,7 +135,7 @@ def scenarios(
     )
     speed = max(uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in team.values()))
     database = draw(DATABASES if policies is None else policies)
-    return Scenario(
+    return schema.Scenario(
         name="drawn",
         seed=draw(st.integers(0, 3)),
         duration_s=draw(st.integers(1, 20).map(float) if durations is None else durations),
@@ -165,16 +148,16 @@ def scenarios(
         decision=draw(_decisions(period, triggers)),
         intervention=draw(_interventions(period, database)),
         gatekeeper=draw(_gatekeepers(period, routes)),
-        runs={method: Run(method, "augmented" if compositions is None else draw(compositions))},
+        runs={method: schema.Run(method, "augmented" if compositions is None else draw(compositions))},
     )
 
 
-def _reach(safe: SafeDistance, own: float, radius: float, speed: float, period: float) -> float:
+def _reach(safe: schema.SafeDistance, own: float, radius: float, speed: float, period: float) -> float:
     """A sensing range, m, that covers safe distances, radii and the way of two robots at this speed in one period."""
     return _farthest(safe, own) + 2.0 * (radius + speed * period)
 
 
-def _farthest(safe: SafeDistance, own: float) -> float:
+def _farthest(safe: schema.SafeDistance, own: float) -> float:
     """The largest distance that any two bodies keep, m, if an obstacle may have its own."""
     return max(safe.obstacle_m, safe.moving_m, safe.ugv_m, safe.air_ground_m, own)
 
@@ -187,12 +170,12 @@ def _maps(
     draw: DrawFn,
     count: int,
     others: int,
-    safe: SafeDistance,
+    safe: schema.SafeDistance,
     largest: float,
     own: float,
     shapes: SearchStrategy[str],
     moving: SearchStrategy[bool],
-) -> tuple[dict[str, Ugv], Uav, dict[str, Obstacle], list[Vector]]:
+) -> tuple[dict[str, schema.Ugv], schema.Uav, dict[str, schema.Obstacle], list[schema.Vector]]:
     """UGVs, UAV and obstacles on a grid, in an arena or without one; `largest` in m."""
     # Each start has its own cell, and so has each target and each obstacle.
     # own: distance that some obstacles have instead of the scenario's, m; 0: none.
@@ -219,10 +202,10 @@ def _maps(
 
 @st.composite
 def _obstacles(
-    draw: DrawFn, kind: str, place: Vector, size: float, radii: SearchStrategy[float], own: float
-) -> Obstacle:
+    draw: DrawFn, kind: str, place: schema.Vector, size: float, radii: SearchStrategy[float], own: float
+) -> schema.Obstacle:
     """An obstacle of a kind whose core extends at most `size`, m, from its place."""
-    obstacle = Obstacle(place, draw(first_of(True, False)), draw(radii))
+    obstacle = schema.Obstacle(place, draw(first_of(True, False)), draw(radii))
     if kind == "ball":
         return obstacle
     obstacle.height_m = 1.0 if kind == "post" else draw(first_of(*HEIGHTS))
@@ -246,19 +229,19 @@ def _obstacles(
     return obstacle
 
 
-def _move(draw: DrawFn, obstacle: Obstacle, cells: list[Cell], pitch: float) -> None:
+def _move(draw: DrawFn, obstacle: schema.Obstacle, cells: list[Cell], pitch: float) -> None:
     """Let an obstacle move from its place through middles of cells."""
     way = _distinct([obstacle.position_m, *draw(_middles(cells, pitch, 3))])
-    at_end = draw(first_of(*AT_END))
+    at_end = draw(first_of(*schema.AT_END))
     if len(way) == 1 or (at_end == "loop" and way[0] == way[-1]):
         way.append([way[0][0] + pitch, *way[0][1:]])
     speed = draw(first_of(*OBSTACLE_SPEEDS))
-    obstacle.position_m, obstacle.moves = [], Moves(way, speed, draw(first_of(0.0, 1.0)), at_end)
+    obstacle.position_m, obstacle.moves = [], schema.Moves(way, speed, draw(first_of(0.0, 1.0)), at_end)
     obstacle.max_speed_m_s, obstacle.known_motion = speed * draw(first_of(*PROMISES)), draw(first_of(False, True))
 
 
 @st.composite
-def _places(draw: DrawFn, free: list[Cell], pitch: float, besides: Cell | None = None) -> Vector:
+def _places(draw: DrawFn, free: list[Cell], pitch: float, besides: Cell | None = None) -> schema.Vector:
     """A point on the ground, m, in a free cell other than `besides`; the cell is free no more."""
     options = [cell for cell in free if cell != besides]
     cell = options[draw(st.integers(0, len(options) - 1))]
@@ -266,7 +249,7 @@ def _places(draw: DrawFn, free: list[Cell], pitch: float, besides: Cell | None =
     return [*(pitch * at + draw(first_of(*JITTER)) for at in cell), 0.0]
 
 
-def _middles(cells: list[Cell], pitch: float, at_most: int) -> SearchStrategy[list[Vector]]:
+def _middles(cells: list[Cell], pitch: float, at_most: int) -> SearchStrategy[list[schema.Vector]]:
     """Some middles of cells, m, occupied or not."""
     return st.lists(first_of(*cells).map(lambda cell: [pitch * cell[0], pitch * cell[1], 0.0]), max_size=at_most)
 
@@ -274,13 +257,13 @@ def _middles(cells: list[Cell], pitch: float, at_most: int) -> SearchStrategy[li
 @st.composite
 def _ugvs(
     draw: DrawFn, cells: list[Cell], starts: list[Cell], targets: list[Cell], pitch: float, radii: SearchStrategy[float]
-) -> Ugv:
+) -> schema.Ugv:
     """A UGV with a target away from its start, and a preset trajectory that may lead anywhere."""
     begin = draw(_places(starts, pitch))
     end = draw(_places(targets, pitch, besides=(round(begin[0] / pitch), round(begin[1] / pitch))))
     speed = draw(first_of(*SPEEDS))
-    preset = Preset(_distinct([begin, *draw(_middles(cells, pitch, 2)), end]), speed)
-    return Ugv(begin, end, preset, draw(first_of(6.0, speed)), draw(radii))
+    preset = schema.Preset(_distinct([begin, *draw(_middles(cells, pitch, 2)), end]), speed)
+    return schema.Ugv(begin, end, preset, draw(first_of(6.0, speed)), draw(radii))
 
 
 @st.composite
@@ -292,10 +275,10 @@ def _uavs(
     pitch: float,
     altitude: float,
     radii: SearchStrategy[float],
-) -> Uav:
+) -> schema.Uav:
     """A UAV whose start and target have cells of their own; its map may have phantom obstacles."""
     above = [[*draw(_places(free, pitch))[:2], altitude] for free in (starts, targets)]
-    return Uav(
+    return schema.Uav(
         start_m=above[0],
         target_m=above[1],
         altitude_m=altitude,
@@ -305,31 +288,31 @@ def _uavs(
     )
 
 
-def _distinct(points: list[Vector]) -> list[Vector]:
+def _distinct(points: list[schema.Vector]) -> list[schema.Vector]:
     """The points without immediate repetitions."""
     return [point for before, point in zip([None, *points], points, strict=False) if point != before]
 
 
 @st.composite
-def _controls(draw: DrawFn, period: float, reach: float) -> Control:
+def _controls(draw: DrawFn, period: float, reach: float) -> schema.Control:
     """Gains up to nine tenths of the bound by the period; a sensing range that is just enough, or larger."""
     gain = st.one_of(st.none(), first_of(0.1, 0.5, 0.9).map(lambda part: part / period))
     names = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
     gains = {name: value for name in names if (value := draw(gain)) is not None}
-    return Control(period_s=period, sensing_range_m=draw(first_of(max(4.0, reach), reach, reach + 4.0)), **gains)
+    return schema.Control(period_s=period, sensing_range_m=draw(first_of(max(4.0, reach), reach, reach + 4.0)), **gains)
 
 
 @st.composite
-def _decisions(draw: DrawFn, period: float, triggers: SearchStrategy[str] | None) -> Decision:
+def _decisions(draw: DrawFn, period: float, triggers: SearchStrategy[str] | None) -> schema.Decision:
     """A trigger with its threshold, a release level below it, and noise with a period of its own."""
-    fixed = first_of(3.0, 1.0, 0.5, 0.1).map(lambda zeta: Threshold(zeta_m=zeta))
+    fixed = first_of(3.0, 1.0, 0.5, 0.1).map(lambda zeta: schema.Threshold(zeta_m=zeta))
     threshold = draw(st.one_of(fixed, st.sampled_from(BAYES)))
     zeta = threshold.zeta_m
     if threshold.rule == "bayes":
         zeta = optimal_threshold(threshold.drift_m_s, threshold.noise_m_sqrt_s, threshold.c1_1_s, threshold.c2)
-    return Decision(
+    return schema.Decision(
         threshold=threshold,
-        trigger=draw(first_of(*TRIGGERS) if triggers is None else triggers),
+        trigger=draw(first_of(*schema.TRIGGERS) if triggers is None else triggers),
         release_m=zeta * draw(first_of(0.5, 0.1, 0.9)),
         min_inter_event_s=draw(first_of(0.5, 0.0, 0.05, 2.0)),
         noise_m_sqrt_s=draw(first_of(0.0, 0.004, 0.1)),
@@ -339,9 +322,9 @@ def _decisions(draw: DrawFn, period: float, triggers: SearchStrategy[str] | None
 
 
 @st.composite
-def _interventions(draw: DrawFn, period: float, database: list[Policy]) -> Intervention:
+def _interventions(draw: DrawFn, period: float, database: list[schema.Policy]) -> schema.Intervention:
     """Times and order in which the UAV asks its policies."""
-    return Intervention(
+    return schema.Intervention(
         period_s=period * draw(first_of(2, 1, 4)),
         retry_s=draw(first_of(1.0, 0.0)),
         ranking=draw(first_of("predicted", "listed")),
@@ -350,10 +333,10 @@ def _interventions(draw: DrawFn, period: float, database: list[Policy]) -> Inter
 
 
 @st.composite
-def _gatekeepers(draw: DrawFn, period: float, routes: SearchStrategy[str] | None) -> Gatekeeper:
+def _gatekeepers(draw: DrawFn, period: float, routes: SearchStrategy[str] | None) -> schema.Gatekeeper:
     """A gatekeeper whose stages and period are multiples of the control period."""
     stages = draw(first_of(60, 20, 6, 2))
-    return Gatekeeper(
+    return schema.Gatekeeper(
         route=draw(first_of(*ROUTES.own) if routes is None else routes),
         period_s=period * draw(first_of(2, 1, 4)),
         horizon_s=stages * period * draw(first_of(2, 1)),

@@ -80,6 +80,8 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             "period_s": control.period_s,
             "sensing_range_m": control.sensing_range_m,
         }
+        if scenario.position_error_m:
+            wanted[name]["stands"] = True
         if len(moving):
             wanted[name]["moving_outlines"] = that_move
     if own := scenario.ugv_controller:  # it is judged by its steps, whatever it was built with

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from builders.worlds import beside_a_wall
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
@@ -13,10 +14,6 @@ from properties import examples
 from airground_drake.base.errors import ScenarioError
 from airground_drake.check import safety
 from airground_drake.check.run import Run, _moves_as_commanded
-from airground_drake.model.bodies.world import Body, World
-from airground_drake.model.geometry import outline
-from airground_drake.model.law.avoidance import Avoidance
-from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.model.plants.ackermann import Ackermann
 from airground_drake.model.plants.steering import chord, steer
 from airground_drake.scenario.load import load, resolved
@@ -39,18 +36,12 @@ def passing(*more: str) -> Trace:
 @given(st.integers(0, 10**6), st.floats(0.1, 0.5), st.floats(0.1, 3.0), st.booleans())
 def test_every_command_is_one_that_its_wheels_can_follow(seed: int, hand: float, radius: float, near: bool) -> None:
     """Under the law, beside a wall or not, whatever the task asks for: |omega| R <= v, at any speed down to 0."""
-    rng, plant = np.random.default_rng(seed), Ackermann(hand, H, backwards=False, radius_m=radius)
-    rows = outline.stacked([outline.prism([[0.0, -9.0], [0.0, 9.0]], gap=0.5)])
-    robot = Body("robot", "ugv", np.zeros(3), plant=plant, max_speed_m_s=1.0)
-    around = World((robot, Body("wall", "obstacle", np.zeros(3), rows)), {}, 3.0).around(slice(0, 1))
-    law = UgvLaw(Avoidance(3.0, H), 1.0, 1.0, False)
-    place = np.array([[around.distance[0, 0] + rng.uniform(0.0, 0.1 if near else 9.0), 0.0, 0.0]])
-    heading, wish = rng.uniform(-np.pi, np.pi, 1), np.append(rng.uniform(-2.0, 2.0, 2), 0.0)
-    command = law.velocity(place, around, place, wish[None], [None], (heading, plant.steering[None]))[0]
+    plant = Ackermann(hand, H, backwards=False, radius_m=radius)
+    command, wish, heading, _ = beside_a_wall(seed, plant, near)
     wished = command.copy()
-    assert steer(command, float(heading[0]), plant.steering, H)[0] == 1.0  # it can follow it in full
+    assert steer(command, heading, plant.steering, H)[0] == 1.0  # it can follow it in full
     assert (command == wished).all()
-    cos, sin = math.cos(heading[0]), math.sin(heading[0])
+    cos, sin = math.cos(heading), math.sin(heading)
     v, omega = chord(command[0] * cos + command[1] * sin, command[1] * cos - command[0] * sin, hand, H)
     assert abs(omega) * radius <= v + 1e-12
     if not near and math.hypot(wish[0], wish[1]) > 0.1:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.worlds import beside_a_wall
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
@@ -18,10 +19,7 @@ from scipy.integrate import solve_ivp
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ScenarioError
 from airground_drake.check.plants import law_m, taken
-from airground_drake.model.bodies.world import Body, World
-from airground_drake.model.geometry import outline
-from airground_drake.model.law.avoidance import Avoidance
-from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.model.bodies.world import Body
 from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance
 from airground_drake.model.plants.delay import Delay
 from airground_drake.model.plants.lag import Lag
@@ -206,27 +204,21 @@ def test_a_run_keeps_its_distances_and_meets_the_hypotheses(plant: str) -> None:
 @given(st.integers(0, 10**6), st.floats(0.1, 0.5), st.booleans())
 def test_a_unicycle_that_never_drives_backwards_does_not(seed: int, hand: float, near: bool) -> None:
     """Under the law, beside a wall or not, whatever the task asks for; it keeps what it could do, and turns."""
-    rng, plant = np.random.default_rng(seed), Unicycle(hand, H, max_turn_rad_s=3.0, backwards=False)
-    rows = outline.stacked([outline.prism([[0.0, -9.0], [0.0, 9.0]], gap=0.5)])
-    robot = Body("robot", "ugv", np.zeros(3), plant=plant, max_speed_m_s=1.0)
-    around = World((robot, Body("wall", "obstacle", np.zeros(3), rows)), {}, 3.0).around(slice(0, 1))
-    law = UgvLaw(Avoidance(3.0, H), 1.0, 1.0, False)
-    place = np.array([[around.distance[0, 0] + rng.uniform(0.0, 0.1 if near else 9.0), 0.0, 0.0]])
-    heading, wish = rng.uniform(-np.pi, np.pi, 1), np.append(rng.uniform(-2.0, 2.0, 2), 0.0)
-    ahead = np.array([np.cos(heading[0]), np.sin(heading[0]), 0.0])
-    command = law.velocity(place, around, place, wish[None], [None], (heading, plant.steering[None]))[0]
+    plant = Unicycle(hand, H, max_turn_rad_s=3.0, backwards=False)
+    command, wish, heading, left_m = beside_a_wall(seed, plant, near)
+    ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
     assert command @ ahead >= 0.0
-    least = np.array([(around.distance[0, 0] - place[0, 0]) / H, 0.0])  # along x, away from the wall; and ahead
+    least = np.array([-left_m / H, 0.0])  # along x, away from the wall; and ahead
     normals, wished = np.stack([[1.0, 0.0], ahead[:2]]), wish[:2] * min(1.0, 1.0 / np.linalg.norm(wish))
     nearest = [wished, *(wished + (b - n @ wished) * n for n, b in zip(normals, least, strict=True))]
     nearest.append(np.linalg.solve(normals, least))
     allowed = [v for v in nearest if (normals @ v >= least - 1e-9).all()]
     due = min(allowed, key=lambda v: float(np.linalg.norm(v - wished)))
     np.testing.assert_allclose(command[:2], due, atol=1e-8)
-    share, _ = steer(command, float(heading[0]), plant.steering, H)
+    share, _ = steer(command, heading, plant.steering, H)
     assert share > 0.0
     back = -ahead  # where another task comes first, as under method (b), it stands
-    assert steer(back, float(heading[0]), plant.steering, H) == (0.0, 0.0)
+    assert steer(back, heading, plant.steering, H) == (0.0, 0.0)
     assert not back.any()
 
 

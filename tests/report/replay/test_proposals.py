@@ -2,42 +2,38 @@
 
 from __future__ import annotations
 
-import pytest
-from report.replay.conftest import with_proposals
+from collections.abc import Callable
+from dataclasses import replace
 
-from airground_drake.report.replay.proposals import LINGER_S, Span, sent
+import pytest
+
+from airground_drake.report.replay.proposals import LINGER_S, sent
 from airground_drake.sim.trace import Trace
 
-CASES = {
-    "refused, and accepted": (
-        [12.0, 14.5], [(12.1, 12.0, "refuse"), (14.6, 14.5, "accept"), (16.9, 14.5, "accept")],
-        [[(12.0, 12.1, "asked"), (12.1, 12.1 + LINGER_S, "refused")],
-         [(14.5, 14.6, "asked"), (14.6, 16.9, "accepted")]],
-    ),
-    "reversed": (
-        [2.0], [(2.1, 2.0, "accept"), (3.0, 2.0, "refuse"), (3.1, 2.0, "refuse")],
-        [[(2.0, 2.1, "asked"), (2.1, 3.0, "accepted"), (3.0, 3.0 + LINGER_S, "refused")]],
-    ),
-    "replaced": (
-        [2.0, 2.5], [(2.1, 2.0, "refuse"), (2.6, 2.5, "refuse")],
-        [[(2.0, 2.1, "asked"), (2.1, 2.5, "refused")], [(2.5, 2.6, "asked"), (2.6, 2.6 + LINGER_S, "refused")]],
-    ),
-    "not answered": ([20.0], [], [[(20.0, 20.0 + LINGER_S, "asked")]]),
-    "none": ([], [], []),
-}  # fmt: skip
-"""Times of proposals, decisions on them, and the outcomes that follow."""
+
+@pytest.mark.parametrize(
+    ("scenario", "name", "spans"),
+    [
+        ("case_a", "b", [("asked", 14.5, 14.5), ("accepted", 14.5, 16.65)]),  # while it is executed: there is no answer
+        ("case_b", "c", [("asked", 10.6, 10.65), ("refused", 10.65, 10.65 + LINGER_S)]),
+        (
+            "case_b",
+            "c_literal",
+            [("asked", 13.1, 13.15), ("accepted", 13.15, 14.1), ("refused", 14.1, 14.1 + LINGER_S)],
+        ),
+    ],
+)
+def test_outcomes_follow_from_what_became_of_a_proposal(
+    run: Callable[..., Trace], scenario: str, name: str, spans: list[tuple[str, float, float]]
+) -> None:
+    found = sent(run(scenario, name))[-1 if name == "c_literal" else 0].spans
+    assert [(span.outcome, span.start_s, span.end_s) for span in found] == [
+        (outcome, pytest.approx(start_s, abs=0.1), pytest.approx(end_s, abs=0.1)) for outcome, start_s, end_s in spans
+    ]
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_outcomes_follow_from_decisions(trace: Trace, name: str) -> None:
-    issued, decisions, outcomes = CASES[name]
-    found = sent(with_proposals(trace, issued, decisions))
-    assert [each.spans for each in found] == [tuple(Span(*span) for span in spans) for spans in outcomes]
-
-
-def test_without_a_gatekeeper_a_proposal_is_accepted_while_it_is_executed(trace: Trace) -> None:
-    (proposal,) = sent(with_proposals(trace, [14.5], []))
-    asked, accepted = proposal.spans
-    assert (asked.outcome, accepted.outcome) == ("asked", "accepted")
-    assert 14.5 < accepted.start_s <= 14.6 + 1e-9
-    assert 16.9 - 1e-9 <= accepted.end_s <= 17.0
+def test_a_proposal_without_an_answer_is_shown_for_a_while(run: Callable[..., Trace]) -> None:
+    trace = run("case_a", "d")
+    alone = replace(trace, decisions=trace.decisions.iloc[:0], samples=trace.samples.assign(**{"ugv1.executing": -1}))
+    (proposal,) = sent(alone)
+    assert [(span.outcome, span.end_s <= span.start_s + LINGER_S) for span in proposal.spans] == [("asked", True)]

@@ -52,10 +52,9 @@ def test_a_refutation_says_who_when_and_what_was_needed(stuck: Trace) -> None:
     wider = replace(stuck, meta=changed(stuck.meta, {"scenario.safe_distance.obstacle_m": 3.0}))
     told = said(wider, "SAFE-TRACE", "LIVE-GOAL")
     assert "LIVE-GOAL is refuted, on run a of minimal (method a, seed 0)\n  claim: Every robot ended" in told
-    assert "  value: tolerance left about where a robot must end: -6.9 m; at least 0 is needed\n" in told
-    assert "  who: ugv1, rock\n  when: t = 3 s\n" in told
+    assert "  value: tolerance left about where a robot must end: \N{MINUS SIGN}6.9 m; at least 0 is needed\n" in told
+    assert "  found: ugv1 and rock at 2.000 m, 3 m required, 3.000 s\n" in told
     assert "safe distance 3 m; min distance 2 m; " in told
-    assert "ugv1 brought itself to 2.00 m from rock; positions rock (5, 0, 0) m, ugv1 (3, 0, 0) m" in told
 
 
 @pytest.mark.parametrize("status", ["inconclusive", "error", "not_run"])
