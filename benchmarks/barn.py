@@ -9,8 +9,6 @@ cylinders and knows those within 4 m; the UAV knows all of them. The shortest wa
 is more for a robot that turns.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

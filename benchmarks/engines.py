@@ -13,8 +13,6 @@ claims on both sides. `--campaign` does so many draws of `campaigns/screened.yam
 with all that belongs to it: drawing, checking and setting up a scenario, and Drake's share.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import time

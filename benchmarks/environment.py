@@ -9,8 +9,6 @@ are `ENVIRONMENTS` environments by our vector environment, and in brackets by Gy
 are of the CPU, of one process with one thread.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import time

@@ -5,8 +5,6 @@ separated. A team: prioritised search in time on a grid, in many orders. A plan 
 time; a search without a plan proves nothing.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 

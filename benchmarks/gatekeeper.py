@@ -12,15 +12,13 @@ counts solutions with a gap of 0. Every problem where the default route misses t
 listed at the end. The last column is the ratio of median times to the default route.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import logging
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -167,7 +165,7 @@ class Known:
     scale: float
 
     @classmethod
-    def of(cls, problem: Problem, solutions: list[Solution]) -> Known:
+    def of(cls, problem: Problem, solutions: list[Solution]) -> Self:
         """By the constant plans and every plan of `solutions`."""
         constants = ConstantPlans.of(problem)
         planned = [d for d in solutions if d.has_plan]

@@ -19,12 +19,11 @@ gatekeepers that believe every prediction, and with random patience. A small evo
 that steal the largest share of the bound.
 """
 
-from __future__ import annotations
-
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from typing import Self
 from unittest import mock
 
 import numpy as np
@@ -131,7 +130,7 @@ class Person:
     speed_m_s: float
 
     @classmethod
-    def drawn(cls, random: np.random.Generator) -> Person:
+    def drawn(cls, random: np.random.Generator) -> Self:
         """Anywhere, also on the UGV."""
         start = np.append(random.uniform(-5.0, 5.0, 2), 0.0)
         return cls(start, float(random.choice([0.3, 1.0])), float(random.choice([0.3, 1.2, 4.0])))

@@ -4,8 +4,6 @@ It may speak without a trigger, and at every planning instant. A `Tactic` says h
 `mutated` changes a part of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any

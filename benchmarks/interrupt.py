@@ -9,8 +9,6 @@ folder must hold no report or one that the independent checker agrees with; and 
 must be no temporary file. Prints what failed, and a table; exit code 1 if anything did.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import random

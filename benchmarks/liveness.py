@@ -11,8 +11,6 @@ is repeated by its seed:
 Courses without a plan are counted, not run, except with `--only`. With `--walls --density 3` and more there are many.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import json

@@ -3,8 +3,6 @@
 A course is drawn from its seed, the number of UGVs and the density alone, so that every method gets the same one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

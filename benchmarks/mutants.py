@@ -5,8 +5,6 @@ each with the tests that must notice it. These run on the copy until one fails; 
 is. Prints a line for each mutant. Exit code 1 if one survives.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

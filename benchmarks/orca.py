@@ -6,8 +6,6 @@ preset trajectory plus a share of the way back to it. All positions and velociti
 it has no UAV, no trigger and no messages. People are agents whose motion is given; robots expect them to give way, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -9,8 +9,6 @@ aims again at what the robots then did. Starts, targets and ways are drawn; a wa
 Nothing promises that nobody is run into: SAFE-OWN must hold in every run.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections import Counter

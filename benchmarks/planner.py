@@ -11,8 +11,6 @@ this script. CPU times depend on the machine; compare those of one run. To measu
 its folder first on the path: `PYTHONPATH=DIR python benchmarks/planner.py`.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import time

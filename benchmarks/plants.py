@@ -6,8 +6,6 @@ prints what the law keeps beyond the distance promised, how much of that the wor
 Drake is the same as the law and the plant step by step, bit by bit. The exit code is 1 if a promise is broken.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator

@@ -14,8 +14,6 @@ Prints each scenario that breaks a promise by its number, which draws it again, 
 the test. Exit code 1 if there is such a scenario.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections import Counter

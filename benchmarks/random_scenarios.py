@@ -13,8 +13,6 @@ has `airground check` make it again. `--coq` also has Coq prove the distances of
 disappear: it must accept those that SAFE-TRACE finds kept, and refuse the others.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import multiprocessing

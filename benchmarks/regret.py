@@ -8,8 +8,6 @@ constant plan, and above the cheapest of all plans, in units of the cheaper cons
 a run are printed.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -9,8 +9,6 @@ points, too, as discs that contain the body at every heading; it knows no turnin
 the hall into three rooms. Presets lead straight to the targets, so through walls, and ORCA plans no way round.
 """
 
-from __future__ import annotations
-
 import argparse
 from functools import partial
 from statistics import median

@@ -7,8 +7,6 @@ distances and bring all home.
 `--policies` prints which policy of the behaviour database helped how often instead, in the runs with a gatekeeper.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter, defaultdict
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What tests share: simulations, reports and proofs that take long are made once per session, whatever its workers."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import signal
@@ -88,13 +86,13 @@ def _no_constants_of_modules() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def run(airground_trace: Simulations) -> Simulations:
+def run(airground_trace: "Simulations") -> "Simulations":
     """`run(scenario, name)`: one simulation of a shipped scenario, made once per session."""
     return airground_trace
 
 
 @pytest.fixture(scope="session")
-def base(run: Simulations) -> Callable[[str], Trace]:
+def base(run: "Simulations") -> Callable[[str], Trace]:
     """`base(name)`: an honest run: synthetic, shipped, or of method (c) with few stages, by route."""
 
     def get(name: str) -> Trace:

@@ -1,7 +1,5 @@
 """Short runs beside a person who walks, or another obstacle that moves, by name."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What all workers of a session share through files."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs with bodies: radii are part of every distance that is kept, predicted or judged."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import asdict, replace

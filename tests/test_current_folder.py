@@ -1,7 +1,5 @@
 """Nothing in the current folder is executed, whatever it is called."""
 
-from __future__ import annotations
-
 import subprocess
 import sysconfig
 from collections.abc import Callable

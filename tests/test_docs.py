@@ -1,7 +1,5 @@
 """The documentation: Python blocks run, links lead somewhere, what is generated is current, recipes work."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The examples run, from a directory of their own, as somebody would run them who has installed the package."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import json

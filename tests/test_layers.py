@@ -1,7 +1,5 @@
 """Which module may import which: every room says so in its docstring."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import defaultdict

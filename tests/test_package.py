@@ -1,7 +1,5 @@
 """What is said of the package: citation and metadata agree with it. `.ci/package` looks at what is built."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The table of deviations names code that exists, code that names the equation, and findings that are there."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Using the package from Python: mistakes are named, and a diagram does what its docstring promises."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from importlib import import_module, reload

@@ -1,7 +1,5 @@
 """What a user's machine may lack: a folder for compiled functions, characters, paths in UTF-8."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sysconfig

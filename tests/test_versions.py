@@ -1,7 +1,5 @@
 """What is pinned, locked and listed is the same, and covers what pyproject.toml asks for."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

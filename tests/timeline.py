@@ -1,7 +1,5 @@
 """Events of a run, in order of time."""
 
-from __future__ import annotations
-
 from airground_drake.sim.trace import Trace
 
 

@@ -82,8 +82,8 @@ SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 OPTIONAL: dict[str, object] = {
-    **dict.fromkeys(("channel", "ugv_controller", "sensing", "uav")), "uavs": {}, "ugvs": [], "lost_at_s": 0.0,
-    "uav_m": 0.0,
+    "channel": None, "sensing": None, "ugv_controller": None,
+    "uav": None, "uavs": {}, "ugvs": [], "lost_at_s": 0.0, "uav_m": 0.0,
 }  # fmt: skip
 """Keys that may be left out, and their values then: a scenario is written and digested as if these did not exist."""
 SETTABLE: tuple[str, ...] = ("channel", "decision", "gatekeeper", "intervention")
@@ -625,9 +625,7 @@ class Scenario:
     to those of the package: `module:Class` or `file.py:Class` by identifier.
     """
 
-    __pydantic_config__: ClassVar = ConfigDict(
-        extra="forbid", revalidate_instances="always", use_attribute_docstrings=True
-    )
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", revalidate_instances="always")
 
     name: Name
     """Its name: letters, digits and underscores."""

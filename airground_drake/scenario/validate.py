@@ -61,11 +61,6 @@ def _uavs(scenario: Scenario) -> Problems:
     for name, uav in scenario.uavs.items():
         if uav.name != name:
             yield f"uavs.{name}.name", uav.name, f"{name}, its key, or no name"
-    if scenario.channel is not None and len(scenario.aerial) > 1:
-        yield "channel", Fault("there are several UAVs"), "wanted: one UAV, or no channel"
-    for name, uav in scenario.aerial.items() if scenario.channel is not None else ():
-        if uav.lost_at_s:
-            yield f"{scenario.key_of(name)}.lost_at_s", uav.lost_at_s, "0: with a channel no UAV is lost"
     if len(scenario.aerial) > 1 and not scenario.safe_distance.uav_m:
         yield "safe_distance.uav_m", Fault("missing"), "wanted: the distance between two UAVs, a number above 0 in m"
 
@@ -90,6 +85,18 @@ def _charges(scenario: Scenario) -> Problems:
             lists = " or ".join(f"{scenario.key_of(name)}.ugvs" for name in scenario.aerial)
             allowed = f"wanted: in {lists}, or one UAV without a list, which gets the rest"
             yield f"ugvs.{ugv}", Fault("in no UAV's charge"), allowed
+
+
+def _channel(scenario: Scenario) -> Problems:
+    """A channel is between one UAV, which is there to the end, and its UGVs."""
+    if scenario.channel is None:
+        return
+    if len(scenario.aerial) > 1:
+        yield "channel", Fault("of several UAVs"), "a channel of one UAV; with several messages arrive at once"
+    for name, uav in scenario.aerial.items():
+        if uav.lost_at_s:
+            key = f"{scenario.key_of(name)}.lost_at_s"
+            yield key, uav.lost_at_s, "0 with a channel; up: {loss: ...} with burst_s makes a UAV deaf for a time"
 
 
 def _names(scenario: Scenario) -> Problems:
@@ -621,6 +628,6 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _uavs, _charges, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains,
-    _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget, _reproduction, _choices,
+    _uavs, _charges, _channel, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends,
+    _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget, _reproduction, _choices,
 )  # fmt: skip

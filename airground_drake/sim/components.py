@@ -109,9 +109,9 @@ def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:
             plant_of(ugv, scenario.control.period_s).trails(ugv.max_speed_m_s) for ugv in scenario.ugvs.values()
         ),
         sender=Sender(uav, first=[*scenario.aerial].index(uav), step=len(scenario.aerial)),
+        lead=scenario.channel.delay_s if scenario.channel else 0.0,
         charge=tuple(ugv in scenario.in_charge(uav) for ugv in scenario.ugvs),
         lost_at=scenario.aerial[uav].lost_at_s or np.inf,
-        lead=scenario.channel.delay_s if scenario.channel else 0.0,
     )
 
 

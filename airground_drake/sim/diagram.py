@@ -274,7 +274,7 @@ def _task_planning(
     }
     renamed: dict[System, Mapping[str, str]] = dict.fromkeys([ugvs, *uavs.values()], measured)
     renamed |= dict.fromkeys(planners.values(), dict.fromkeys(measured, "seen_by_uav"))
-    return _assembled("task_planning", systems, named, wires=wires, renamed=renamed)
+    return _assembled("task_planning", systems, named, None, wires, renamed=renamed)
 
 
 def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:

@@ -133,9 +133,9 @@ class Planner:
     # Per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.
     trails: tuple[bool, ...] = ()
     sender: Sender = ONLY  # the UAV
+    lead: float = 0.0  # time that a proposal is under way, s
     charge: tuple[bool, ...] = ()  # per UGV, whether the UAV is in charge of it; default: of all
     lost_at: float = np.inf  # from this time on the UAV neither sends nor hears anything, s
-    lead: float = 0.0  # time that a proposal is under way, s
 
     @property
     def radii(self) -> Array:

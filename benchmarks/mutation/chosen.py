@@ -1,7 +1,5 @@
 """The mutants that matter: faults that once were real, or that would break a claim; every room of the core has some."""
 
-from __future__ import annotations
-
 from mutation.mutant import Mutant
 
 WIRING = ("tests/hypotheses/test_wiring.py",)

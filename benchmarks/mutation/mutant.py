@@ -1,7 +1,5 @@
 """A mutant: one edit of one file of the package, and the tests that notice it."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Files are written whole or not at all, and what killed processes have left is swept."""
 
-from __future__ import annotations
-
 import errno
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A process that is interrupted ends at once, with one line, and with all that descends from it."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Pieces of work in processes of their own."""
 
-from __future__ import annotations
-
 import os
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The progress of long work, on a terminal and elsewhere."""
 
-from __future__ import annotations
-
 import io
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Names: declared once, imported when used, from the package, from entry points, or as `module:Class`."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from importlib.metadata import EntryPoint

@@ -1,7 +1,5 @@
 """The benchmark's own planners on cases with a known answer, and against the package's shortest paths."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

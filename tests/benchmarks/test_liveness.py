@@ -1,7 +1,5 @@
 """The table and the explanations of the benchmark of liveness, on made-up runs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import liveness

@@ -1,7 +1,5 @@
 """Random courses: the same each time, well-formed, and with the walls that they say."""
 
-from __future__ import annotations
-
 import maps
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The chosen mutants fit the code: every edit applies, once. `benchmarks/mutants.py` says what catches each."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Benchmarks start, and their problems and attacks are what they say."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 

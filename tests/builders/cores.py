@@ -1,7 +1,5 @@
 """Drawn convex cores as outlines, and places near them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,9 +1,8 @@
 """Problem (26) of a decision with few stages, written down for tests: loops instead of the claims' broadcasting."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
+from typing import Self
 
 import numpy as np
 from scipy.optimize import minimize
@@ -34,7 +33,7 @@ class GateData:
     terminal_weight: float
 
     @classmethod
-    def of(cls, row: DecisionRecord) -> GateData:
+    def of(cls, row: DecisionRecord) -> Self:
         """The problem of a recorded decision, with the half-planes that ask for something."""
         return cls(*(row[name] for name in ARRAYS[:-1]), row.half_planes, *(getattr(row, name) for name in WEIGHTS))
 

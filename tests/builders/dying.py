@@ -1,7 +1,5 @@
 """Work that ends its process: in a module that other processes can import."""
 
-from __future__ import annotations
-
 import os
 import time
 from pathlib import Path

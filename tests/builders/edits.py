@@ -1,7 +1,5 @@
 """Edits of a trace: each returns a copy. Edits by name are functions from trace to trace."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from dataclasses import replace

@@ -7,8 +7,6 @@ No world of theirs is copied. The shipped scenario `barn` is the field of seed `
     python tests/builders/fields.py > field.world && airground import barn field.world
 """
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

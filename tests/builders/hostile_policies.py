@@ -1,7 +1,5 @@
 """One policy for each kind of attack on a policy's process, its protocol and the run, with what is to be reported."""
 
-from __future__ import annotations
-
 import os
 import resource
 import signal

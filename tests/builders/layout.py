@@ -1,7 +1,5 @@
 """Makes a trace from positions, velocities and held signals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One short experiment, written in the forms of other loggers; what is true of it by formulas of its own."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

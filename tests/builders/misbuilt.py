@@ -1,7 +1,5 @@
 """Controllers and teams that are built otherwise than the scenario says."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

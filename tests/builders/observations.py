@@ -1,7 +1,5 @@
 """What the UAV sees of a team, for policies alone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

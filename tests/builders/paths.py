@@ -1,7 +1,5 @@
 """Traces along given corners, with any events."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Problems (26) of the gatekeeper, made without a run."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

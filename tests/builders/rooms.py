@@ -1,7 +1,5 @@
 """Shapes of obstacles, and a scenario with all of them."""
 
-from __future__ import annotations
-
 from airground_drake.scenario.schema import Obstacle, Policy, Preset, Run, SafeDistance, Scenario, Uav, Ugv
 from airground_drake.scenario.validate import check
 

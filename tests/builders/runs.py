@@ -1,7 +1,5 @@
 """Runs that many tests share."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import planner

@@ -1,7 +1,5 @@
 """Scenarios as resolved: nested dicts, as a trace carries them."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """Walls, polygons and balls for tests of ways among them, and distances by formulas of their own."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 from hypothesis import strategies as st

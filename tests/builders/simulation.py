@@ -1,7 +1,5 @@
 """A small simulation in numpy: NSBC with avoidance on top and a fixed detour, or scripted velocities."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from itertools import pairwise

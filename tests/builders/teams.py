@@ -1,7 +1,5 @@
 """Teams in the plane for joint planning: where robots are, where they are to go, and what is in between."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Worlds of robots and obstacles, made without a scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ package does not stop at one number: after an edit that is `made_again`, verdict
 the forged traces and scenario.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

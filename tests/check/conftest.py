@@ -1,7 +1,5 @@
 """The report that the tests of the checker share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Third-party code in the report that is forged: a policy that fails, and a claim."""
 
-from __future__ import annotations
-
 from typing import NoReturn
 
 from airground_drake.sim.trace import Trace

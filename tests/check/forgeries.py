@@ -1,7 +1,5 @@
 """Edits of a report of case B: a forgery for each rule of the checker, and hostile files."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

@@ -1,7 +1,5 @@
 """Forge copies of a report of case B, and check them; digests are made right afterwards, as a forger would."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io

@@ -1,7 +1,5 @@
 """The command line: exit codes, JSON, and other files than reports."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

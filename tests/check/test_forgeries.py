@@ -1,7 +1,5 @@
 """Forgeries of a report are refused: by the checker, by the report made again, or by the runs simulated again."""
 
-from __future__ import annotations
-
 import ast
 import math
 from collections.abc import Iterator, Sequence

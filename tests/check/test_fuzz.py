@@ -1,7 +1,5 @@
 """Whatever is in a report's files: an exit code, strict JSON or one line, and no agreement on what was changed."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Honest runs of random scenarios: no disagreement, no error. `benchmarks/random_scenarios.py` tries hundreds."""
 
-from __future__ import annotations
-
 import contextlib
 from pathlib import Path
 from typing import Any

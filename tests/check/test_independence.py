@@ -1,7 +1,5 @@
 """The checker shares no code with what it checks, and needs only numpy, pandas and pyarrow."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

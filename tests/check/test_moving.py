@@ -1,7 +1,5 @@
 """Runs beside obstacles that move or disappear: the checker agrees with the claims, and refuses forged ways."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

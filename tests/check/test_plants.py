@@ -1,7 +1,5 @@
 """The checker on runs with robots that turn, lag or get commands late: same verdicts, and forged bodies are found."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reports as written agree everywhere, whatever the scenario."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

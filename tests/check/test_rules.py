@@ -1,7 +1,5 @@
 """Rules refuse what they are for, and say where."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

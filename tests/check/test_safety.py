@@ -1,7 +1,5 @@
 """Distances and shortfalls of the checker against closed forms."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from types import SimpleNamespace
 from typing import Any, cast

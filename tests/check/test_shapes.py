@@ -1,7 +1,5 @@
 """Shapes of the checker against dense sampling, whole polygons without parts, and the package's own geometry."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from fractions import Fraction

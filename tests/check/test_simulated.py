@@ -1,7 +1,5 @@
 """Two traces agree only if every table does, exactly; otherwise the first row that differs is told."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

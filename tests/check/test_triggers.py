@@ -1,7 +1,5 @@
 """The checker's own decision variable against closed forms."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, cast
 

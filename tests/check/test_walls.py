@@ -1,7 +1,5 @@
 """Runs among walls, polygons and boxes: the checker holds what was kept, and refuses forged walls and places."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

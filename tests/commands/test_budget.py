@@ -1,7 +1,5 @@
 """`airground budget`: what is printed adds up, and the picture names each term."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from xml.etree import ElementTree

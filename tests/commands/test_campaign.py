@@ -1,7 +1,5 @@
 """`airground campaign`, from outside."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import subprocess

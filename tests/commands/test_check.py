@@ -1,7 +1,5 @@
 """`airground check`: the checker and the claims' own code go over the files, each line says which."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """The command line `airground`: commands are imported when used, and mistakes are one line."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

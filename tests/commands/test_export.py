@@ -1,7 +1,5 @@
 """`airground export`: which files it writes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`airground falsify`, from outside."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

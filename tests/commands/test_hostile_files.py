@@ -1,7 +1,5 @@
 """Files that are made to hang a command or to fill the memory are refused in one line, or left out."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """`airground import`: scenarios of worlds, maps and benchmarks of others."""
 
-from __future__ import annotations
-
 import math
 import os
 import shutil

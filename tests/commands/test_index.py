@@ -1,7 +1,5 @@
 """`airground index`: a folder of reports gets a page that leads to them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`airground judge`: the log of an experiment, judged on the command line."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """`airground replay`: pages and videos of a report's runs."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

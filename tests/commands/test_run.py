@@ -1,7 +1,5 @@
 """`airground run`: what it prints and saves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from commands.conftest import Airground

@@ -1,9 +1,7 @@
 """What a scenario demands of its robots, in plain numpy: nothing here comes from the code that is tested."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -46,7 +44,7 @@ class Demands:
     reach: float
 
     @classmethod
-    def of(cls, scenario: Scenario) -> Demands:
+    def of(cls, scenario: Scenario) -> Self:
         """Of a scenario."""
         ugvs, uav, control = list(scenario.ugvs.values()), scenario.uav, scenario.control
         obstacles, count = list(scenario.obstacles.values()), len(ugvs) + 1

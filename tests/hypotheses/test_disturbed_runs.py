@@ -1,7 +1,5 @@
 """Disturbed runs of the running avoidance layer keep d - W/A wherever their inequalities were met (SAFE-DIST)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple

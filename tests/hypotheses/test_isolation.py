@@ -1,7 +1,5 @@
 """The running trigger takes what was due in a step, and nothing else (THR-TRIG): against an evaluation in 256 bits."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import flint

@@ -6,8 +6,6 @@ gatekeepers are called as their system calls them: not while they are idle. A co
 new proposal must be accepted while tries are left, also after every rest, and else refused.
 """
 
-from __future__ import annotations
-
 import inspect
 from dataclasses import replace
 from typing import Any, NamedTuple

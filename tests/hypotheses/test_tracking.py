@@ -1,7 +1,5 @@
 """LIVE-GATE on the running gatekeeper and control law: a UGV that is pushed aside keeps to what it has accepted."""
 
-from __future__ import annotations
-
 import numpy as np
 from builders.worlds import world
 

@@ -3,8 +3,6 @@
 Both compare times and levels only. So every order of the values, ties and next floats included, is every case.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The built diagram against the scenario: it is as demanded, and broken variants of it are noticed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any

@@ -6,8 +6,6 @@ command must be the closest velocity that the scenario allows. So what is missin
 without leave shows as another command.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -4,8 +4,6 @@ An oracle is a function from a trace to its faults. A fault is about our code an
 have one. So they are tests, and run on shipped and on drawn scenarios.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from airground_drake.sim.trace import Trace

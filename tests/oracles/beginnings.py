@@ -1,7 +1,5 @@
 """What a UGV knew when it decided about a proposal, and how it predicts other robots, again from a trace."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Closed loops of a UGV rolled out again in plain numpy, many side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple, TypeVar
 

@@ -1,7 +1,5 @@
 """What a run commanded is the control law with the proposals that each UGV should execute, evaluated again."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Messages are sent only while they are needed, and carry the obstacles that the UAV knew."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -3,8 +3,6 @@
 Velocities in m/s, positions in m, world frame. Nothing of the running code is used.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +33,7 @@ class Inequalities(NamedTuple):
     bound: Array
     retreat: Array | None = None
 
-    def also(self, normal: Array, bound: Array) -> Inequalities:
+    def also(self, normal: Array, bound: Array) -> "Inequalities":
         """With further ones, (B, E, 3) and (B, E), of the lowest priority; they ask for no retreat."""
         retreat = None if self.retreat is None else np.concatenate([self.retreat, np.zeros_like(bound)], axis=1)
         both = (np.concatenate(parts, axis=1) for parts in ((self.normal, normal), (self.bound, bound)))

@@ -4,8 +4,6 @@ GATE-PLAN judges plans for the problem that was recorded. Here that problem is c
 the rules, and what a route says of its own plan with bounds of the optimum.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

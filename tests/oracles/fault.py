@@ -1,7 +1,5 @@
 """A fault that an oracle finds."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 

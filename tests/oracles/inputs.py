@@ -1,7 +1,5 @@
 """What a decision rested on, as recorded: parts within range, known, new and told."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Faults of the running code, as patches, and what tests run them on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Outcomes of accepting and of refusing a proposal, rolled out again from a trace; method (d) decides by them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

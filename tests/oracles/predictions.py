@@ -1,7 +1,5 @@
 """What the gatekeeper predicts for yes and for no is what the UGV would do, rolled out again by other code."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

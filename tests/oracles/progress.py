@@ -1,7 +1,5 @@
 """Under method (d) every answer and its reason follow from the rules, and accepted interventions end."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest

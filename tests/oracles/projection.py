@@ -5,8 +5,6 @@ changes. Otherwise the best velocity lies on the boundary of that constraint: th
 In one dimension the answer is the closest point of an interval.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """The protocol: who had which proposal in force when, and who executed which, from messages and modes alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What a UGV senses in a run: parts of barriers and robots within range, and parts that it had not sensed before."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

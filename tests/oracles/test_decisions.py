@@ -1,7 +1,5 @@
 """The oracle of decisions: silent on honest runs, and not on records that a faulty gatekeeper would leave."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Faults of the running code: the oracle about it notices the run that it makes, and LIVE-HYP what it must."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

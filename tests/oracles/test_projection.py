@@ -1,7 +1,5 @@
 """The closest velocity under inequalities: against its optimality conditions and against the running kernel."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

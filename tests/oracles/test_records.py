@@ -1,7 +1,5 @@
 """Each rule of an oracle finds a record that was edited against it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

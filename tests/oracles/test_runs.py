@@ -1,7 +1,5 @@
 """No oracle finds a fault in a run of the code as it is: shipped scenarios, drawn ones, unusual ones."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """What unicycles and cars can do of their commands, written again: many at once, limits found by halving."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from airground_drake.base.arrays import Array

@@ -4,8 +4,6 @@ The nodes are points around the corners of cores; a way over them is longer than
 thousandth.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse.csgraph import dijkstra

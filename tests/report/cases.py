@@ -1,7 +1,5 @@
 """Case A in small, as far as a report looks at it, and verdicts on it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """A small scenario, its traces and their figures."""
 
-from __future__ import annotations
-
 import pytest
 from report.cases import make_scenario, make_traces
 

@@ -1,7 +1,5 @@
 """What needs attention: in words, with who and when."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The page in a real browser: no violation that axe-core finds, folds that links open, a filter, no script needed."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The command line: exit codes, one-line errors, files."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

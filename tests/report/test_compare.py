@@ -1,7 +1,5 @@
 """Two reports compared: what is worse, what only differs, and which files are refused."""
 
-from __future__ import annotations
-
 import copy
 import json
 import re

@@ -1,7 +1,5 @@
 """The document: schema, overall verdict, what is missing, audit."""
 
-from __future__ import annotations
-
 import json
 import xml.etree.ElementTree as ET
 from copy import deepcopy

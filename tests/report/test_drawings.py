@@ -1,7 +1,5 @@
 """Drawings of a page that was made again: coordinates may differ by rounding, and nothing else."""
 
-from __future__ import annotations
-
 import pytest
 
 from airground_drake.report.rebuild import _is_same_drawing

@@ -1,7 +1,5 @@
 """Evidence as tables."""
 
-from __future__ import annotations
-
 import json
 
 from hypothesis import given

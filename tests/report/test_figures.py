@@ -1,7 +1,5 @@
 """Figures: panels, tables, labels, SVG for a page."""
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
@@ -84,6 +82,7 @@ def team(scenario: Scenario, size: int, *, triggered: str = "") -> tuple[Scenari
 @example(size=7, scale_m=0.0, apart_m=0.0, end_s=30.0, rows=300, triggered=False, alone=True, x_m=2.0)
 @example(size=7, scale_m=1e9, apart_m=1e9, end_s=1e5, rows=2, triggered=True, alone=False, x_m=1e12)
 @example(size=1, scale_m=1e9, apart_m=0.0, end_s=1e-6, rows=1, triggered=True, alone=True, x_m=None)
+@example(size=1, scale_m=1e4, apart_m=0.0, end_s=1e-6, rows=300, triggered=False, alone=False, x_m=None)
 @example(size=13, scale_m=1e-12, apart_m=1e-12, end_s=30.0, rows=2, triggered=False, alone=True, x_m=None)
 def test_every_figure_is_drawn_of_equal_empty_single_and_huge_data(
     size: int, scale_m: float, apart_m: float, end_s: float, rows: int, triggered: bool, alone: bool, x_m: float | None

@@ -1,7 +1,5 @@
 """Pictures of findings about the paper."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A report is written only where nothing else is."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

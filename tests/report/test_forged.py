@@ -1,7 +1,5 @@
 """A hostile name in forged metadata is refused in one line, or it is text wherever it is shown."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

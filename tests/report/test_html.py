@@ -1,7 +1,5 @@
 """The page: escaped, self-contained, well-formed, accessible."""
 
-from __future__ import annotations
-
 import re
 from base64 import b64encode
 from dataclasses import fields, is_dataclass, replace

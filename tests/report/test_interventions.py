@@ -1,7 +1,5 @@
 """What the help of the UAV came to: every proposal, messages beside always-on supervision, avoidance meanwhile."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The JUnit file."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 from report.cases import FINE, built, verdict

@@ -1,7 +1,5 @@
 """The pages kept in reports/ say what the code says."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Copies of a map's files in a report: who needs to believe the rectangles can make them again."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Reports on maps say which place of the map is meant: the one nearest to the robot."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Formulas as MathML."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 from airground_drake.report.audit.typeset import FORMULAS

@@ -1,7 +1,5 @@
 """Third-party code on the command line: it runs only where allowed; whatever it does, the exit code is right."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """What Coq found about the runs, in the page: said only of what was proved, and the files stay those of the report."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

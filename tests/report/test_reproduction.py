@@ -1,7 +1,5 @@
 """Every measure with its failing side, and the rows of the table."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

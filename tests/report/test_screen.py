@@ -1,7 +1,5 @@
 """The first screen: each cell by itself, and what no screen may say whatever the verdicts are."""
 
-from __future__ import annotations
-
 import copy
 import random
 from collections.abc import Callable

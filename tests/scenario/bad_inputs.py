@@ -4,8 +4,6 @@
 allowed. After a sentence was improved: `python tests/scenario/bad_inputs.py`, and read the difference.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A small valid scenario on which one thing at a time is broken, and what the tests of mistakes share."""
 
-from __future__ import annotations
-
 import copy
 import functools
 from collections.abc import Callable

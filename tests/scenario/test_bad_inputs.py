@@ -1,7 +1,5 @@
 """Every mistake is one printable line that names file and line, key, value and what is allowed, as the table has it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from scenario.bad_inputs import SHOWN, TABLE, messages

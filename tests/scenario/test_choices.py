@@ -1,7 +1,5 @@
 """What is not the paper's is declared under `choices`, and an override takes its reason away."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """The way of an obstacle that moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The shipped deadlocks: somebody is stuck without the UAV, and a joint plan exists with room to spare."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from feasible import joint_plan, shortest_length

@@ -1,7 +1,5 @@
 """What a scenario asks for is counted from its numbers: held against runs, and refused in one line."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

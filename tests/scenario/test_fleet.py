@@ -1,7 +1,5 @@
 """Generated fleets."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """Nothing but ScenarioError, whatever the file."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Sequence
 from pathlib import Path

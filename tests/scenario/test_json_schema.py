@@ -1,7 +1,5 @@
 """The JSON Schema of scenario files accepts what loads and refuses what cannot stand at a key; its copy is current."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, fields
 from typing import Any

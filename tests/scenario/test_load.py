@@ -1,7 +1,5 @@
 """What is well-formed loads, with the values of the file, of `--set` and of each run's `set`."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, replace
 

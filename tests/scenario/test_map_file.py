@@ -1,7 +1,5 @@
 """The key `map`: files of map_server become an obstacle; every mistake is one line."""
 
-from __future__ import annotations
-
 import copy
 import io
 import math

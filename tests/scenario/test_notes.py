@@ -1,7 +1,5 @@
 """Notes on what is allowed and seldom meant."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

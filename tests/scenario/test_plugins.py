@@ -1,7 +1,5 @@
 """What of a scenario is third-party code."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from textwrap import dedent

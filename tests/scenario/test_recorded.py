@@ -1,7 +1,5 @@
 """The scenario in the metadata of a run, typed again."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A run with values of its own, `set`: simulated, judged and reported with them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

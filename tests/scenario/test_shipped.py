@@ -1,7 +1,5 @@
 """What the shipped scenarios put to the test, all of them together: every claim, and every kind of inequality."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Rules of a scenario that take more than one bad value to show; the others are in `bad_inputs.py`."""
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 

@@ -1,7 +1,5 @@
 """Diagrams and their pictures."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

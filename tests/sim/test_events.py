@@ -1,7 +1,5 @@
 """Events that follow from signals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Runs in child processes: what comes back is a trace, an error in words, or that the process died."""
 
-from __future__ import annotations
-
 import os
 import select
 import signal

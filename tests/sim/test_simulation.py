@@ -1,7 +1,5 @@
 """Whole runs: timelines, reproducibility, noise, saved traces."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

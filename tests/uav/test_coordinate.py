@@ -1,7 +1,5 @@
 """The coordinate policy: who moves, who is asked to make way, and what is proposed to whom."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

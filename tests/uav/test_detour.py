@@ -1,7 +1,5 @@
 """The detour: round obstacles, and round robots that stand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -4,8 +4,6 @@ As long as the UAV learns of obstacles from refusals alone, it sends the same ac
 UGVs have used up their tries: they arrive after 57 s in place of 30 s.
 """
 
-from __future__ import annotations
-
 import maps
 import numpy as np
 

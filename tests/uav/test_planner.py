@@ -1,7 +1,5 @@
 """The UAV's planner: joint plans, who is asked for whom, and what a refusal changes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Policies in whole runs: what goes wrong in one is reported, and nothing wrong gets past method (d)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

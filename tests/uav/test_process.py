@@ -1,7 +1,5 @@
 """Third-party policies in processes of their own: what goes wrong there is one line and counts as no intervention."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Time limits, and limits within limits."""
 
-from __future__ import annotations
-
 import signal
 import time
 import weakref

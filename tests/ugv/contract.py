@@ -1,9 +1,7 @@
 """What every route owes for every problem and every budget."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
-from typing import get_args
+from typing import Self, get_args
 
 import numpy as np
 import pytest
@@ -29,7 +27,7 @@ class Recording(Problem):
     plans: list[Evaluation] = field(default_factory=list)
 
     @classmethod
-    def of(cls, problem: Problem) -> Recording:
+    def of(cls, problem: Problem) -> Self:
         return cls(**{f.name: getattr(problem, f.name) for f in fields(Problem)})
 
     def evaluate(self, omega: np.ndarray) -> Evaluation:

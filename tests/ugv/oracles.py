@@ -1,7 +1,5 @@
 """The gatekeeper's formulas written again, and the cheapest of all plans by evaluating each."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from airground_drake.ugv.binary_program import block_of_stage

@@ -1,7 +1,5 @@
 """Roll-outs of the closed loop: the running controller's law, the plant's step, the points that count."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """DAQP as a solver of Drake: programs with known answers, random ones, and what it refuses."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Method (c): from a solution to an answer, and since when it stands."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What comes of accepting and of refusing, rolled out to the end."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

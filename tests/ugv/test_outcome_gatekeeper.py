@@ -1,7 +1,5 @@
 """Method (d)'s gatekeeper, sample by sample: what it remembers, when it answers, and what tips the balance."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

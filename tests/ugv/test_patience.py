@@ -1,7 +1,5 @@
 """The automaton of tries and rests."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples

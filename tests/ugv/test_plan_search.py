@@ -1,7 +1,5 @@
 """Beam search and local search by the cost (25), against evaluating every plan or every change."""
 
-from __future__ import annotations
-
 from itertools import combinations_with_replacement
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The relaxation without a solver: costs, bounds, half-planes, weak duality, sum-up rounding."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Findings about the model, made once in a session however many modules and workers look at them."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Claims about a run, by their identifiers, on one trace."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 from airground_drake.sim.trace import Trace

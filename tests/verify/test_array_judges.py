@@ -1,7 +1,5 @@
 """Array judges come to what the judge of traces comes to, and pass nothing that is wrong with a run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Findings are kept by what they depend on."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What every claim about a run must do, whatever it claims."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """How often a claim was put to the test: counted by every claim, 0 where nothing tested it, demanded by scenarios."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

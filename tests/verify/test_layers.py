@@ -1,7 +1,5 @@
 """Who may import whom inside verify/: claims about a run share no code with what they judge, engines know no claim."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

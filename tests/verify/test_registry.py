@@ -1,7 +1,5 @@
 """Which claims there are, and that a claim is one file and one line."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from importlib import import_module

@@ -28,6 +28,7 @@ THUMBNAIL_IN = (2.5, 1.9)  # width and height of a small picture, inches
 MAX_THUMBNAIL_UGVS, MAX_THUMBNAIL_POINTS = 20, 200
 # Least size of the wedge of a robot with a heading, as a share of the picture, and number of wedges on its way.
 WEDGE, WEDGES = 0.008, 9
+MOST_OBLONG = 12.0  # a map is at most so much longer than wide: labels have no place beside a line
 # Margin left of a map, both side margins together, margins below and above it, inches.
 _LEFT_IN, _BESIDE_IN, _BELOW_IN, _ABOVE_IN = 0.5, 0.65, 0.42, 0.1
 _VOID_DASH, _WAY_DOTS = (0, (1.5, 2.5)), (0, (1.0, 1.5))
@@ -64,8 +65,10 @@ def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
         for barrier in barriers_of(scenario)
     ]
     shown = np.concatenate([*points, *arena_of(scenario)])
-    (left, bottom), (right, top) = shown.min(axis=0) - 0.4, shown.max(axis=0) + 0.4
-    return Frame(left, right, bottom - 0.6, top + 0.8)
+    low, high = shown.min(axis=0) - [0.4, 1.0], np.add(shown.max(axis=0), [0.4, 1.2])
+    beside = np.maximum(0.0, (high - low).max() / MOST_OBLONG - (high - low)) / 2.0
+    (left, bottom), (right, top) = low - beside, high + beside
+    return Frame(left, right, bottom, top)
 
 
 def axes_over(frame: Frame, width_in: float, full_in: float = 0.0, below_in: float = 0.0) -> tuple[Figure, Axes]:

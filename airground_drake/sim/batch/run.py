@@ -53,9 +53,9 @@ class LeftToDrakeError(Exception):
 class Batch:
     """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
-    # Left to Drake: users' plants and controllers, channels, errors of positions, several UAVs, one that is lost, and
-    # tasks of the UAV that are not the package's; monitors, observers, decision blocks and disturbances are no part of
-    # a scenario.
+    # Left to Drake: users' plants and controllers, channels, errors of positions, several UAVs, one that is lost, tasks
+    # of the UAV that are not the package's. Monitors, observers, decision blocks and disturbances are no part of a
+    # scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Set it up: everything that does not depend on the seed."""

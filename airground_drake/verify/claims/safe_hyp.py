@@ -127,7 +127,8 @@ class SafeHyp(TraceClaim):
         "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run. Beside an obstacle that "
         "may move the passive law held, and it moved no faster than declared: so d was kept in every period that "
         "began at d + V h or more. The controllers were built with what the scenario says; one of the user's own is "
-        "judged by its steps alone."
+        "judged by its steps alone. Where robots act on measured positions, the inequalities are those of the pair as "
+        "measured, errors were within their bound, and d is that of the true bodies."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -149,7 +150,8 @@ class SafeHyp(TraceClaim):
         "inside a polygon the normal of its nearest edge. A barrier of several parts has an inequality for each of "
         "them, and keeps what all of them keep. The distances promised are listed less the radii. The parameters of "
         "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
-        "apart count as one instant."
+        "apart count as one instant. With errors of positions D and n are those of measured ones and steps are true: a "
+        "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
@@ -160,6 +162,7 @@ class SafeHyp(TraceClaim):
         "time on, and the safe start is that D >= d at that sample. The bodies of robots that lag, get their commands "
         "late or never drive backwards must be clear then, too, and so must their ways under commands already given, "
         "for the time of the delay. If they are not, nothing is promised for the pair.",
+        "All robots act on the same measured positions, those that are recorded.",
         "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",
     )
     does_not_establish = (

@@ -1,7 +1,5 @@
 """Who keeps what distance from whom, in which order, and how bodies move."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

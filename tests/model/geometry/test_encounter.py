@@ -1,7 +1,5 @@
 """The least distance of a way from a core is that of its segments, though most of them are passed over."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

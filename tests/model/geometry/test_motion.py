@@ -1,7 +1,5 @@
 """Motions along waypoints."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Tests of the shortest path among discs: known lengths, a brute-force oracle, properties of the curve."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

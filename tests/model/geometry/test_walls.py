@@ -1,7 +1,5 @@
 """Ways among walls, polygons and balls: shortest paths, distance fields, separated places, looked-up outlines."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Set-based avoidance: safe distances under any lower-priority velocity, and what breaks them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from builders.worlds import among_points, world

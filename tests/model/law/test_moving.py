@@ -1,7 +1,5 @@
 """Beside obstacles that move: what the robot does itself, what it keeps, and that it retreats."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

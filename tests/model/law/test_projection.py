@@ -1,7 +1,5 @@
 """The closest allowed velocity against its optimality conditions, solved in rational numbers without rounding."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from fractions import Fraction

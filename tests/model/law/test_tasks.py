@@ -1,7 +1,5 @@
 """Tasks, against finite differences and by hand; the law as their composition."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

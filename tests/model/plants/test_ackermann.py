@@ -1,7 +1,5 @@
 """A car: it turns at a least radius, never backwards, and its body keeps the distances."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

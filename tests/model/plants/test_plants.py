@@ -1,7 +1,5 @@
 """Robots that turn and lag: their motion against the equations, the distance they take, and runs of them."""
 
-from __future__ import annotations
-
 import copy
 import math
 from dataclasses import asdict, replace

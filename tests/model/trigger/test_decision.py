@@ -1,7 +1,5 @@
 """Bayes risk and threshold, and the trigger automaton."""
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal, localcontext
 

@@ -1,7 +1,5 @@
 """The least and the largest decision variable over a step, against sampling and by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

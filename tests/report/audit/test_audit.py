@@ -1,7 +1,5 @@
 """The paper's audit: every item is demonstrated by what it computes, and not if the evidence is not there."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

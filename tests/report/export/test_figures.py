@@ -1,7 +1,5 @@
 """Figures as files, and the captions that go with them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """An MCAP file, read by the reader of the format's own package."""
 
-from __future__ import annotations
-
 import io
 import json
 import sys

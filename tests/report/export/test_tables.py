@@ -1,7 +1,5 @@
 """CSV files read back as the trace has it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A small scene: case A in small, with a proposal that is refused and one that is accepted."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

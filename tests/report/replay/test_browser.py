@@ -1,7 +1,5 @@
 """The replay in a real browser: any name is shown, and the page's policy admits its own scripts and no other."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Serving: an index, a page per run, nothing else, on this machine only."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Obstacles that move, appear and disappear, in each kind of replay."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page of a run: whole, offline, escaped, and small."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

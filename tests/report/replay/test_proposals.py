@@ -1,7 +1,5 @@
 """The outcomes of proposals over time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

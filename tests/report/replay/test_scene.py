@@ -1,7 +1,5 @@
 """Positions and states at each frame."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

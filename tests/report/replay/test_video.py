@@ -1,7 +1,5 @@
 """Videos: as many pictures as the speed asks for, that differ; one line if a video cannot be made."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Bands, grids and cameras."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 import pytest

@@ -1,7 +1,5 @@
 """Labels of maps keep clear of marks, of lines and of each other where there is room."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure

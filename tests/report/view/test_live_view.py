@@ -1,7 +1,5 @@
 """What a Meshcat shows while a run is simulated, and that the run is the same without it."""
 
-from __future__ import annotations
-
 import msgpack
 import pandas as pd
 from pydrake.geometry import Meshcat

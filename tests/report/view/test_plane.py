@@ -1,7 +1,5 @@
 """The ground plane: what of it is shown, and what says what is known of an obstacle."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

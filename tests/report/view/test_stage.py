@@ -1,7 +1,5 @@
 """What a stage has of walls: how large they are drawn, where they end, and what of the arena."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import cast
 

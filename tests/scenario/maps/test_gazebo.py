@@ -1,7 +1,5 @@
 """Gazebo worlds: shapes in frames within frames; hostile files."""
 
-from __future__ import annotations
-
 import cmath
 import math
 

@@ -1,7 +1,5 @@
 """Maps in the world: their frame, and what robots can reach."""
 
-from __future__ import annotations
-
 import cmath
 import itertools
 

@@ -1,7 +1,5 @@
 """Images of maps: occupied, free and unknown cells, by ROS's rule; broken and hostile files."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

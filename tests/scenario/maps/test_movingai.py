@@ -1,7 +1,5 @@
 """MovingAI's maps and scenarios: rows from the top in the file, from the bottom here; broken files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Occupied cells as few rectangles."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Where robots can start and end on a map."""
 
-from __future__ import annotations
-
 import heapq
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Runs by the compiled loop: the same traces as Drake's, bit by bit, and what is left to Drake."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

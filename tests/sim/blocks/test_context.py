@@ -1,7 +1,5 @@
 """The state of a run is in its Context: copies, other simulators, threads and runs made again are identical."""
 
-from __future__ import annotations
-
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any

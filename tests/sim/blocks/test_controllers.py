@@ -1,7 +1,5 @@
 """The UAV's controller and the task below its avoidance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

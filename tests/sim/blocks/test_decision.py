@@ -1,7 +1,5 @@
 """The event trigger in a Drake diagram: events between two updates are isolated, or made up for."""
 
-from __future__ import annotations
-
 import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

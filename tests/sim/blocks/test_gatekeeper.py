@@ -1,7 +1,5 @@
 """The gatekeeper in a diagram: dwell, refusals, budget by counts and by an injected clock."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

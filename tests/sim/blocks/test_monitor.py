@@ -1,7 +1,5 @@
 """The monitor: silent on honest runs, and where SAFE-HYP finds its first violation it finds the same."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

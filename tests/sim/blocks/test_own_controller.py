@@ -1,7 +1,5 @@
 """A controller of the user's own for the UGVs: fed by name, checked, and judged by its steps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Users' plants: Drake Systems with a declared drift and cover, which each run measures."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

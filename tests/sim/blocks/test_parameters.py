@@ -1,7 +1,5 @@
 """Gains and threshold are parameters of the Context: a change there acts, and the trace tells it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

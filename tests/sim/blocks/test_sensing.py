@@ -182,3 +182,30 @@ def test_the_law_keeps_what_the_theorem_asks_for(distance: float, one: Bounds, o
     least = least_gain(distance, one, other)
     kept = law - error - loss / (gain * part)
     assert error * (1.0 - part * least) == pytest.approx(part * least * kept, rel=1e-9)
+
+
+def orbited(error: float, gain_share: float, distance: float = 0.6, period: float = 0.05) -> float:
+    """The least distance, m, at which a robot goes round a point that it always sees the worst way: abreast of it."""
+    share = gain_share * least_gain(distance, Bounds(error_m=error))
+    law = float(law_distance(distance, Bounds(error_m=error), gain=share / period))
+    place, nearest = np.array([law, 0.0, 0.0]), law
+    for _ in range(200):
+        apart = float(np.linalg.norm(place))
+        if apart <= error:
+            return 0.0
+        seen, turn = np.sqrt(apart**2 - error**2), np.arctan2(place[1], place[0]) + np.arcsin(error / apart)
+        normal = np.array([[np.cos(turn), np.sin(turn), 0.0]])
+        bound = share / period * (law - seen) if seen <= law else -(law - seen) / period
+        wish = error / period * np.array([-normal[0, 1], normal[0, 0], 0.0])
+        step = period * kernels.avoid_one(wish, normal, np.array([bound]), kernels.STANDING)
+        along = float(np.clip(-(place @ step) / max(step @ step, 1e-12), 0.0, 1.0))
+        nearest = min(nearest, float(np.linalg.norm(place + along * step)))
+        place = place + step
+    return nearest
+
+
+@pytest.mark.parametrize("error", [0.02, 0.05, 0.25])
+def test_the_condition_on_the_gain_is_needed(error: float) -> None:
+    """Directions that are wrong in each period add up, unless the gain makes up for them."""
+    assert orbited(error, 1.0) >= 0.6
+    assert orbited(error, 0.2) < 0.6 - 0.1 * error

@@ -1,7 +1,5 @@
 """Systems of different periods tick at the same instants, to the last bit."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

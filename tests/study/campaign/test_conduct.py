@@ -1,7 +1,5 @@
 """Which draws of a folder count."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path

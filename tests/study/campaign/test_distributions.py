@@ -1,7 +1,5 @@
 """Draws: functions of their number, within their bounds, independent of other keys."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Draws of the hostile campaign in which two exact roll-outs of one outcome once went different ways."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

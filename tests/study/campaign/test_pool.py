@@ -1,7 +1,5 @@
 """Processes die, and their items are done."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Samplers, objectives and shrinking, without simulations."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Specs: what is drawn, and what is refused with a line that says where and what is allowed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

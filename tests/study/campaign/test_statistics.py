@@ -1,7 +1,5 @@
 """Bounds of a probability: against another implementation, and by what they promise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

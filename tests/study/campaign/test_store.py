@@ -1,7 +1,5 @@
 """A finished draw stays finished, and counts once."""
 
-from __future__ import annotations
-
 import errno
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Sweeps: runs as a table, and what became of them by the value of a key."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

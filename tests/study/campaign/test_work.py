@@ -1,7 +1,5 @@
 """The rows of one draw, whatever becomes of it."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Streams become tracks: gaps, repeated rows, frames, names and units; each rule has a case that needs it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """One experiment in the forms of many loggers: each gets the verdict that its numbers have."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial

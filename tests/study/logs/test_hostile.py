@@ -1,7 +1,5 @@
 """Logs that are broken, huge or made to mislead: one line says why, and nothing else happens."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

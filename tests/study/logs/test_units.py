@@ -1,7 +1,5 @@
 """Units, numbers of frames and axes that a log leaves open: found only where they are certain, else asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

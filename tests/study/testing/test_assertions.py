@@ -1,7 +1,5 @@
 """Claims as assertions: what passes, what fails, and what is said then."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """The plugin: importing it is cheap, and a run is simulated once."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every draw is a valid scenario, of every kind; failures shrink to the simplest scenario."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

@@ -1,7 +1,5 @@
 """Joint plans keep every distance exactly, at all times, and are found where there is one."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import combinations

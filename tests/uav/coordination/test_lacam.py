@@ -1,7 +1,5 @@
 """The search over joint steps finds a plan wherever its graph has one, and else proves that it has none."""
 
-from __future__ import annotations
-
 from collections import deque
 from itertools import combinations, pairwise, product
 

@@ -1,11 +1,9 @@
 """Every solution route of (26) keeps one contract, and the routes agree."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -107,7 +105,7 @@ def test_no_route_finds_a_plan_below_the_bound_of_another() -> None:
 class Failed:
     """A solver, and its result, without success."""
 
-    def Solve(self, *arguments: object) -> Failed:
+    def Solve(self, *arguments: object) -> Self:
         return self
 
     def is_success(self) -> bool:

@@ -1,7 +1,5 @@
 """The default route: (26) with binaries, solved to a proven optimum, by DAQP or by a solver of Drake."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any

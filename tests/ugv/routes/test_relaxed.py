@@ -1,7 +1,5 @@
 """The paper's route, and the nonlinear program of (27)."""
 
-from __future__ import annotations
-
 import cvxpy
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Exact geometry against sampling, and bounds of distances against the distances themselves."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Signed distances from walls, polygons and prisms: by certificates, by sampling, and beside the running code's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from builders.cores import drawn, places

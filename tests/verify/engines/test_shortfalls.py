@@ -1,7 +1,5 @@
 """By how much positions miss the inequalities of set-based avoidance, exactly."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -1,7 +1,5 @@
 """SAFE-BUDGET: what the law keeps beyond the safe distance is what the theorems ask for, and no less."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Claims that are theorems: proved where Coq has checked them and the scenario meets their hypotheses, else open."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the tests of the theorems share: theories that are compiled once per session, whatever its workers."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whether theorems count as proved: the theories are compared with the record of their last check, without Coq."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Runs as theorems: Coq proves those that keep their distances and refuses the others; files say what traces say."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math

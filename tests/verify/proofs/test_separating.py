@@ -1,7 +1,5 @@
 """Vectors that separate: they are exact, they exist wherever a distance is kept, and few are enough for what is far."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The theorems, by Coq: what is proved and on which axioms; what may not be assumed; what cannot be proved."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from dataclasses import replace

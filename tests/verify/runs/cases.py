@@ -1,7 +1,5 @@
 """Kinds of edits of a run, and honest runs by name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

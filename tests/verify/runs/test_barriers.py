@@ -1,7 +1,5 @@
 """Claims about runs beside walls, polygons and prisms: distances that can be worked out by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

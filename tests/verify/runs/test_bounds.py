@@ -1,7 +1,5 @@
 """What claims about decisions compute, against enumeration, another method or the running code."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

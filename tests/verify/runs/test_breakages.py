@@ -1,7 +1,5 @@
 """Each claim about a run holds on honest records, and does not on records that were edited."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

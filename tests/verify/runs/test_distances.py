@@ -1,7 +1,5 @@
 """SAFE-TRACE and SAFE-HYP: distances between rows, of every pair, and what follows from a shortfall."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs that put a claim to an unusual test, and hold; what a claim says of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import islice
 from typing import Any

@@ -1,7 +1,5 @@
 """Bodies that lag or get their commands late, beside what appears or stops; each hypothesis of SAFE-HYP by itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

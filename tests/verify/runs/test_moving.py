@@ -1,7 +1,5 @@
 """Claims beside obstacles that move: whose doing it was, which distances are promised, and what was declared."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -204,7 +202,7 @@ def test_theorems_are_about_bodies_at_rest_and_robots() -> None:
 
 def test_safe_dist_counts_retreats_at_the_disturbance_and_at_that_and_the_persons_speed() -> None:
     trace = persons.run("squeezed")
-    (found,) = (each for each in judge_all(trace.scenario, [trace]) if each.claim.id == "SAFE-DIST")
+    (found,) = judge_all(trace.scenario, [trace], claims=["SAFE-DIST"])
     gap, normal = of_person(trace)[trace.sample_rows], trace.position("ugv1") - trace.position("person")
     normal = (normal / np.linalg.norm(normal, axis=1)[:, None])[trace.sample_rows]
     away = (normal * trace.chosen("ugv1")).sum(axis=1)[gap < D + H]

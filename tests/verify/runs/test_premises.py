@@ -1,7 +1,5 @@
 """How often the premises of theorems were met in runs."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

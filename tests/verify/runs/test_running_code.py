@@ -1,7 +1,5 @@
 """Mutants of the running code: the claim about it refutes the run that it makes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

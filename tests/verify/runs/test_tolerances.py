@@ -1,7 +1,5 @@
 """For each claim about a run: a record changed by twice its tolerance is refuted, and by half of it holds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Constants of threshold rules."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from airground_drake.model.trigger.bayes import optimal_threshold

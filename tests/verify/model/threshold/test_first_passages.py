@@ -1,7 +1,5 @@
 """Simulated paths between two thresholds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """THR-CHOICE."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -72,8 +70,9 @@ def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str
 
 def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str, str], Trace]) -> None:
     scenario = load("bayes_threshold")
-    verdicts = judge_all(scenario, [run("bayes_threshold", name) for name in scenario.runs])
-    found, printed = [verdict.evidence for verdict in verdicts if verdict.claim.id == "THR-CHOICE"]
+    runs = [run("bayes_threshold", name) for name in scenario.runs]
+    verdicts = judge_all(scenario, runs, claims=["THR-CHOICE"])
+    found, printed = [verdict.evidence for verdict in verdicts]
     assert (set(found.runs), set(printed.runs)) == ({"a ugv1", "d ugv1"}, {"d_printed ugv1"})
     for row in (found.runs["a ugv1"], printed.runs["d_printed ugv1"]):
         assert row.drift_m_s == pytest.approx(1.0, abs=1e-6)

@@ -1,7 +1,5 @@
 """THR-DDM."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from statistics import NormalDist

@@ -1,7 +1,5 @@
 """THR-ROOT and THR-OPT."""
 
-from __future__ import annotations
-
 import mpmath
 import numpy as np
 import pytest

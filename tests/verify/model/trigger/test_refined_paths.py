@@ -1,7 +1,5 @@
 """Paths under refinement, and the triggers on them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

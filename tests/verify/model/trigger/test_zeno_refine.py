@@ -1,7 +1,5 @@
 """ZENO-REFINE."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from itertools import pairwise
