@@ -4,8 +4,9 @@
     python benchmarks/environment.py case_a lab --seconds 20
 
 An agent proposes two random waypoints, or nothing in one request of four. A reset begins an episode on a model that
-exists already; its time excludes the periods up to the first request. A new course needs a new model. Times are of the
-CPU, of one process with one thread.
+exists already; its time excludes the periods up to the first request. A new course needs a new model. `side by side`
+are `ENVIRONMENTS` environments by our vector environment, and in brackets by Gymnasium's loop over single ones. Times
+are of the CPU, of one process with one thread.
 """
 
 import argparse
@@ -16,17 +17,19 @@ from pathlib import Path
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 import numpy as np
+from gymnasium.vector import SyncVectorEnv, VectorEnv
 
 from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.simulation import Recorder
 from airground_drake.study.campaign.spec import load_spec
 from airground_drake.study.environments.encoding import Encoding
+from airground_drake.study.environments.gymnasium_env import InterventionEnv, InterventionVectorEnv
 from airground_drake.study.environments.sources import Source
 
 DEFAULT = ("case_a", "case_b", "warehouse", "crossing")
 CAMPAIGN = Path(__file__).parents[1] / "examples" / "learned.yaml"
-RESETS = 20
+RESETS, ENVIRONMENTS = 20, 16
 
 
 def played(source: Source, number: int, rng: np.random.Generator) -> tuple[float, int, float]:
@@ -62,6 +65,20 @@ def times_ms(source: Source, numbers: range) -> list[float]:
     return found
 
 
+def side_by_side(envs: VectorEnv, period_s: float, seconds: float) -> float:
+    """Control periods per second of CPU time of environments that are stepped together."""
+    rng, before, simulated = np.random.default_rng(1), np.zeros(ENVIRONMENTS), 0.0
+    envs.reset(seed=1)
+    began = time.process_time()
+    while time.process_time() - began < seconds:
+        actions = rng.uniform(-1.0, 1.0, envs.action_space.shape).astype(np.float32)
+        actions[:, 0] += 0.5
+        now = envs.step(np.clip(actions, -1.0, 1.0))[4]["t_s"]
+        simulated += float(np.maximum(now - before, 0.0).sum())
+        before = now
+    return simulated / period_s / (time.process_time() - began)
+
+
 def main() -> None:
     """Print a line per scenario, and one about new courses."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -77,9 +94,13 @@ def main() -> None:
             done.append(played(source, len(done), rng))
         simulated, requests, took = (sum(column) for column in zip(*done, strict=True))
         resets = times_ms(source, range(RESETS))
+        both = (InterventionVectorEnv(ENVIRONMENTS, scenario),
+                SyncVectorEnv([lambda scenario=scenario: InterventionEnv(scenario)] * ENVIRONMENTS))  # fmt: skip
+        together = [side_by_side(envs, scenario.control.period_s, given.seconds / 2.0) for envs in both]
         print(
             f"{name}: {len(scenario.ugvs)} UGVs, {simulated / scenario.control.period_s / took:.0f} periods of "
-            f"{scenario.control.period_s:g} s per second (at one go: {at_one_go(scenario):.0f}), "
+            f"{scenario.control.period_s:g} s per second (at one go: {at_one_go(scenario):.0f}, "
+            f"side by side: {together[0]:.0f} [{together[1]:.0f}]), "
             f"{requests / len(done):.1f} requests per episode, "
             f"reset {np.median(resets):.1f} ms (worst {max(resets):.1f})"
         )

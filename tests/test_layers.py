@@ -30,7 +30,7 @@ def test_gatekeepers_know_of_interventions_only_what_is_sent() -> None:
         for node in ast.walk(tree(path))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airground_drake.uav")
     }
-    assert found == {"airground_drake.uav.messages", "airground_drake.uav.policy"}
+    assert found == {f"airground_drake.uav.{name}" for name in ("channel", "messages", "policy")}
 
 
 @cache

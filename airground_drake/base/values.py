@@ -64,6 +64,8 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False, le=LARGEST)]
 Real = Annotated[Number, Field(ge=-LARGEST), BeforeValidator(as_float)]
 Positive = Annotated[Number, Field(ge=SMALLEST), BeforeValidator(as_float)]
 Share = Annotated[Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(as_float)]
+Loss = Annotated[Number, wanted("a number from 0 to below 1", ge=0.0, lt=1.0), BeforeValidator(as_float)]
+Chance = Annotated[Number, Field(ge=0.0, le=1.0), BeforeValidator(as_float)]
 NotNegative = Annotated[Number, Field(ge=0.0), BeforeValidator(as_float)]
 
 

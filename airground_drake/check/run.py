@@ -168,6 +168,15 @@ class Run:
         """Three columns of the samples, (S, 3), such as `ugv1.vx_m_s`: stem `v`, unit `m_s`; raises as `column_of`."""
         return np.stack([column_of(self.samples, f"{robot}.{stem}{axis}_{unit}") for axis in "xyz"], axis=1)
 
+    @cached_property
+    def error_m(self) -> float:
+        """How far measured positions may be off, m."""
+        return float((self.scenario.get("sensing") or {}).get("position_error_m", 0.0))
+
+    def seen_m(self, robot: str) -> Array:
+        """Measured positions of a robot at the control samples, (S, 3), m."""
+        return self.sampled(robot, "seen_", "m")
+
     def times_s(self, robot: str, kind: str) -> Array:
         """Times of the recorded events of a kind, increasing."""
         times_s = [float(event["t_s"]) for event in self.events if (event["robot"], event["kind"]) == (robot, kind)]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .files import Json
-from .plants import MOST_PARTS, STRAIGHT_M, least_radius_m, only_ahead, own_of, unicycle_of
+from .plants import MOST_PARTS, STRAIGHT_M, Rows, least_radius_m, only_ahead, own_of, unicycle_of
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run, column_of
 from .scenario import Pair, expected_m_s, written
@@ -211,6 +211,35 @@ def shortfalls_m(
     return shortfalls
 
 
+def gain_of_pair(pair: Pair, gain: Fraction) -> Fraction:
+    """The gain with which a pair meets the law: half of A h where one of two robots may stand."""
+    return gain * Fraction(pair.share) if pair.error_m else gain
+
+
+def measured_shortfall_m(run: Run, law: Pair, rows: Rows, gain: Fraction, last: Fraction) -> Fraction:
+    """The largest amount that a pair lacks at one sample of the inequality of its measured positions, m per period."""
+    # The steps are true ones. A pair that stands lacks nothing, nor does one that is far.
+    samples = np.searchsorted(run.sample_row, rows[:-1])
+    own_m, other_m = run.position_m[law.robot][rows], run.position_m[law.other][rows]
+    seen = run.seen_m(law.robot)[samples] - (run.seen_m(law.other)[samples] if law.other in run.robots else 0.0)
+    apart, step = own_m[:-1] - other_m[:-1], np.diff(own_m, axis=0) - np.diff(other_m, axis=0)
+    lasts = [Fraction(1)] * (len(apart) - 1) + [last]
+    reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
+    enough, lacks = reach / np.array([float(length) for length in lasts]) + law.safe_m + FAR_M, Fraction()
+    for bound, part, near in law.shape.near(apart):
+        if bound >= enough.max():
+            break
+        far = part.signed_m(apart[near]) >= enough[near]
+        for k in (near.start + np.flatnonzero(~far)).tolist():  # also where it is not a number
+            if not reach[k]:
+                continue
+            gone = [Fraction(axis) / lasts[k] for axis in step[k].tolist()]
+            given = gone, Fraction(law.safe_m), Fraction(1), gain, len(part.corners) == 1
+            ways = part.away([Fraction(axis) for axis in seen[k].tolist()])
+            lacks = max(lacks, min(_missed_m(away, *given) for away in ways))
+    return lacks
+
+
 def lost_m(missed: Fraction, gain: Fraction, samples: int) -> float:
     """Bound of the distance that a shortfall can cost, m: e / (A h), or the sum over all samples if the gain is 0."""
     return float(missed / gain if gain else missed * samples)
@@ -236,6 +265,9 @@ def safe_hyp(run: Run) -> Found:
                 missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last)) - pair.slip_m
                 about = f"{pair.robot}, {pair.other}"
                 holds("passive law", missed <= SMALL, missed, "0 m missed", about=about)
+            elif pair.error_m:
+                lacks = measured_shortfall_m(run, law, rows, gain_of_pair(pair, gain), last)
+                lost = max(lost, lost_m(lacks, gain_of_pair(pair, gain), len(run.sample_row)) - pair.drift_m)
             else:
                 lacks = shortfall_m(own, other, law, gain, last)
                 lost = max(lost, lost_m(lacks, gain, len(run.sample_row)) - pair.drift_m)
@@ -254,10 +286,14 @@ def _constants(run: Run) -> None:
     for pair in (pair.in_the_law for pair in run.pairs):
         about = f"{pair.robot}, {pair.other}"
         speed = written(limit[pair.robot]) + written(limit.get(pair.other, pair.moves_m_s))
-        least = written(pair.safe_m) + speed * period
+        least = written(pair.safe_m) + speed * period + written(pair.error_m)
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
         start = np.inf if pair.moves_m_s else pair.shape.least_m(run.steered_apart(pair)[:1])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
+        if pair.error_m:
+            kept = pair.safe_m - pair.error_m - pair.drift_m
+            bears = float(gain_of_pair(pair, gain)) * (pair.error_m + kept) - pair.error_m
+            holds("gain for errors", bears >= -SMALL, bears, "0 m at least", about=about)
         if pair.start_s is not None:
             start, due = _first_m(run, pair), pair.safe_m - pair.more_m
             holds("safe start of the bodies", start >= due - SMALL, start, f"{due} at least", about=about)
@@ -310,6 +346,10 @@ def _motion(run: Run) -> None:
         slow = speed <= spec["max_speed_m_s"] + SMALL
         most = f"{spec['max_speed_m_s']} at most"
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)
+        if run.error_m:
+            off = np.linalg.norm(run.seen_m(robot) - place[run.sample_row], axis=1)
+            most = f"{run.error_m} m at most"
+            holds("error of the measured position", off <= run.error_m, off, most, about=robot, t_s=run.sample_s)
         if robot in run.ugvs:
             close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)
     for name in run.moving:

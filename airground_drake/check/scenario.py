@@ -36,6 +36,7 @@ class Pair(NamedTuple):
     cover_m: float = 0.0  # how far both bodies may be from these points after a period, together
     drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
     slip_m: float = 0.0  # how much of its command the robot may miss in a period
+    error_m: float = 0.0  # how far the measured relative position may be off: then the law acts on that one
     # For how long from the start on the bodies have to be clear by themselves, since commands given before lead them;
     # None where their steered points say enough.
     start_s: float | None = None
@@ -96,7 +97,7 @@ def as_run(scenario: Json, name: str) -> Json:
 
 def uavs_of(scenario: Json) -> dict[str, Json]:
     """Each UAV's part of the scenario, by name."""
-    return {scenario["uav"]["name"]: scenario["uav"]}
+    return scenario.get("uavs") or {scenario["uav"]["name"]: scenario["uav"]}
 
 
 def robots_of(scenario: Json) -> dict[str, Json]:
@@ -173,11 +174,24 @@ def pairs_of(scenario: Json) -> list[Pair]:
             ]
     beside_robots = []
     for first, second in combinations(robots, 2):
-        gap_m = safe["air_ground_m" if second in uavs else "ugv_m"]
+        kinds = {"uav" if name in uavs else "ugv" for name in (first, second)}
+        gap_m = safe["air_ground_m" if len(kinds) == 2 else f"{kinds.pop()}_m"]
         radii = radii_m(robots[first], robots[second])
         beside_robots.append(Pair(first, second, gap_m, radii, limit[first] + limit[second], 0.5))
     room = {name: taken(robot, scenario["control"]) for name, robot in robots.items()}
-    return [_with_plants(pair, room) for pair in beside_obstacles + beside_robots]
+    with_plants = [_with_plants(pair, room) for pair in beside_obstacles + beside_robots]
+    error_m = float((scenario.get("sensing") or {}).get("position_error_m", 0.0))
+    return [_as_measured(pair, error_m) for pair in with_plants] if error_m else with_plants
+
+
+def _as_measured(pair: Pair, error_m: float) -> Pair:
+    """A pair whose law acts on measured positions: e + sqrt(m^2 + e^2), and a drift at the gain of the pair."""
+    # Of two robots one may stand: the pair then meets the law with half the gain, and a drift costs twice as much.
+    robots = 1 if pair.share == 1.0 else 2
+    error_m, drift_m = robots * error_m, robots * pair.drift_m
+    undrifting = pair.safe_m + pair.more_m - pair.drift_m
+    law_m = error_m + math.hypot(undrifting, error_m) + drift_m
+    return pair._replace(more_m=law_m - pair.safe_m, drift_m=drift_m, error_m=error_m)
 
 
 def _with_plants(pair: Pair, room: dict[str, Taken]) -> Pair:

@@ -90,8 +90,8 @@ def _about(group: Sequence[PairBudget]) -> str:
     """The pairs of a group in words."""
     first, second = (list(dict.fromkeys(getattr(pair, name) for pair in group)) for name in ("first", "second"))
     kind = group[0].kind
-    if kind == "ugv":
-        return f"two UGVs ({_named([*dict.fromkeys([*first, *second])])})"
+    if kind in ("ugv", "uav"):
+        return f"two {kind.upper()}s ({_named([*dict.fromkeys([*first, *second])])})"
     if kind == "air_ground":
         return f"{_named(first)} and {_named(second)}"
     return f"{_named(first)} beside {_named(second)}{', which may move' if kind == 'moving' else ''}"

@@ -85,7 +85,8 @@ class RunFacts:
     def is_proved(self) -> bool:
         """Whether theorems keep the distances from bodies at rest and between robots, and their conditions held."""
         robots = self._scenario.robots.values()
-        as_told = all(plant.kind == AS_TOLD for robot in robots for plant in robot.plant)
+        seen = not self._scenario.position_error_m
+        as_told = seen and all(plant.kind == AS_TOLD for robot in robots for plant in robot.plant)
         needed = (*rules.PROOFS, *[rules.PROOF_OF_PLANTS][: not as_told])
         met = self.claim(rules.CONDITIONS).status in PASSING and self._spec.composition == "augmented"
         return self.method == "d" and met and all(self.claim(name).status == "proved" for name in needed)
@@ -182,6 +183,12 @@ class RunFacts:
     @property
     def uavs(self) -> list[str]:
         return [*self._scenario.aerial]
+
+    @property
+    def lost_s(self) -> dict[str, float]:
+        """When UAVs were lost, s, by name."""
+        until = self._scenario.duration_s
+        return {name: uav.lost_at_s for name, uav in self._scenario.aerial.items() if 0.0 < uav.lost_at_s < until}
 
     @property
     def ends_too_early(self) -> bool:

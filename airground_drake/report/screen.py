@@ -209,6 +209,7 @@ def _uav(run: RunFacts) -> Cell:
     if run.refusals:
         (reason, _), *others = run.refusals.most_common()
         lines.append(f"{'mostly' if others else 'why'} refused: {refusal(reason)}")
+    lines += [f"{name} was lost at {lost_s:g} s" for name, lost_s in run.lost_s.items()]
     if failed := len(run.run.faults):
         lines.append(f"policy failed {counted(failed, 'time')}")
     messages = run.run.metrics.messages
@@ -338,7 +339,9 @@ def _real(report: Report) -> str:
     """That real robots and other starts may differ; with what a user's plant showed of what it declares."""
     own = [plant for claim in report.about(rules.CONDITIONS) for plant in claim.evidence.get("own_plants", ())]
     if not own:
-        return "other starts or real robots end so, too: arrival is only seen, and sensing is perfect here"
+        error_m = report.scenario.resolved.position_error_m
+        sensing = f"errors of positions are at most {error_m:g} m" if error_m else "sensing is perfect"
+        return f"other starts or real robots end so, too: arrival is only seen, and {sensing} here"
     most = max(own, key=lambda plant: float(plant["cover_m"]))
     return (
         "other starts or real robots end so, too: {robot} showed {drift_m_s:.2g} of {declared_drift_m_s:.3g} m/s drift "

@@ -6,13 +6,15 @@ from collections.abc import Iterable, Iterator
 from itertools import combinations
 from typing import NamedTuple
 
-from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance
+from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance, least_gain
 from airground_drake.scenario.outlines import gap_m
-from airground_drake.scenario.plants import plant_of
+from airground_drake.scenario.plants import bounds_of, plant_of
 from airground_drake.scenario.schema import Scenario
 
 # By term of a budget, the key that it comes from; a dip follows from several.
-KEYS = {"dip": "dip", "drift": "drift_m_s", "lag": "time_constant_s", "delay": "delay_s"}
+KEYS = {
+    "dip": "dip", "drift": "drift_m_s", "lag": "time_constant_s", "delay": "delay_s", "error": "position_error_m",
+}  # fmt: skip
 
 
 class Term(NamedTuple):
@@ -28,12 +30,13 @@ class PairBudget(NamedTuple):
 
     first: str  # a robot
     second: str  # a robot, an obstacle, the map or a wall of the arena
-    kind: str  # `ugv`, `air_ground`, `obstacle`, or `moving` for an obstacle that may move
+    kind: str  # `ugv`, `uav`, `air_ground`, `obstacle`, or `moving` for an obstacle that may move
     promised_m: float  # gap to be kept between the surfaces, m
     radii_m: float  # sum of both radii, m
     law_m: float  # distance that the law keeps between steered points, or a steered point and a core, m
     terms: tuple[Term, ...]  # what it takes beyond the promise and the radii, in the order of their addition
     start: str = ""  # what the promise asks for where the obstacle appears later than at the start; '' if nothing
+    least_gain: float = 0.0  # least A h with which errors of measured positions cost no more than that
 
     @property
     def gap_m(self) -> float:
@@ -59,8 +62,11 @@ class PairBudget(NamedTuple):
 
 
 def takes_room(scenario: Scenario) -> bool:
-    """Whether any robot is not where the law steers it, so that the law keeps more than the distances promised."""
-    return any(plant_of(robot, scenario.control.period_s).signals for robot in scenario.robots.values())
+    """Whether any robot is not where the law steers or sees it, so that the law keeps more than is promised."""
+    period_s = scenario.control.period_s
+    return scenario.position_error_m > 0.0 or any(
+        plant_of(robot, period_s).signals for robot in scenario.robots.values()
+    )
 
 
 def budget(scenario: Scenario) -> Iterator[PairBudget]:
@@ -68,8 +74,8 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
     safe, gain = scenario.safe_distance, scenario.control.avoidance_gain_1_s
     bounds, cover = dict[str, Bounds](), dict[str, str]()
     for name, robot in scenario.robots.items():
-        plant = plant_of(robot, scenario.control.period_s)
-        bounds[name], cover[name] = plant.bounds(robot.max_speed_m_s), plant.cover_key
+        bounds[name] = bounds_of(robot, scenario.control.period_s, scenario.position_error_m)
+        cover[name] = plant_of(robot, scenario.control.period_s).cover_key
 
     def of_pair(first: str, second: str, kind: str, promised: float, radii: float) -> PairBudget:
         both = bounds[first], bounds.get(second, AT_REST)
@@ -80,7 +86,8 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
         ]
         law = float(law_distance(promised + radii, *both, gain=gain, passive=passive))
         start = _start(bounds[first], promised, law - radii) if kind == "obstacle" and appears.get(second) else ""
-        return PairBudget(first, second, kind, promised, radii, law, tuple(terms), start)
+        least = least_gain(promised + radii, *both)
+        return PairBudget(first, second, kind, promised, radii, law, tuple(terms), start, least)
 
     appears = {name: obstacle.appears_s for name, obstacle in scenario.obstacles.items()}
     radius = {name: robot.radius_m for name, robot in scenario.robots.items()}

@@ -14,10 +14,10 @@ NOT_MODELLED = {
     r"accel|decel|jerk|brak": "acceleration limits are not modelled",
     r"mass|inertia|torque|force|friction|slip|grip": "forces are not modelled: robots have the velocities that are "
     "commanded",
-    r"delay|latenc|packet|bandwidth|(message|link|communication).*(loss|rate)": "messages arrive at once, and none is "
-    "lost",
+    r"latenc|packet|bandwidth|(message|link|communication).*(delay|loss|rate)": "what happens to messages is under "
+    "channel",
     r"(sensor|sensing|position|measurement|odometry).*(noise|error|drift)|occlu|field_of_view|fov": "sensing within "
-    "range is perfect",
+    "range misses nothing, and sensing.position_error_m bounds errors of positions",
     r"batter|energy|fuel|power": "energy is not modelled",
     r"wind|weather|slope|terrain": "the ground is flat, and there is no wind",
 }  # fmt: skip

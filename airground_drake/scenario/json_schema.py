@@ -6,10 +6,14 @@ may refuse a file that the schema accepts, never the other way round (with merge
 
 from __future__ import annotations
 
+import ast
 import functools
+import inspect
 import json
+import textwrap
 from collections.abc import Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, is_dataclass
+from itertools import pairwise
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -86,8 +90,10 @@ def _expectations(claims: Registry, installed: bool) -> Schema:
 def _object(kind: type, made: Schema) -> Schema:
     """The schema of a dataclass: its keys in order, with descriptions, units and defaults."""
     properties: Schema = {}
+    words = _words_of(kind)
     for field in fields(kind):
-        says = properties[field.name] = made["properties"][field.name]
+        says = dict(sorted({**made["properties"][field.name], "description": words[field.name]}.items()))
+        properties[field.name] = says
         if unit := unit_of(field.name):
             says["description"] += f" [{unit}]"
         if field.default_factory is not MISSING:
@@ -99,6 +105,22 @@ def _object(kind: type, made: Schema) -> Schema:
         "required": made.get("required", []),
         "additionalProperties": False,
     }
+
+
+def _words_of(kind: type) -> dict[str, str]:
+    """What is written below each field of a dataclass; pydantic would read all sources whenever a file is loaded."""
+    words: dict[str, str] = {}
+    for base in (base for base in reversed(kind.__mro__) if is_dataclass(base)):
+        tree = ast.parse(textwrap.dedent(inspect.getsource(base))).body[0]
+        assert isinstance(tree, ast.ClassDef)
+        for line, below in pairwise(tree.body):
+            if (
+                isinstance(line, ast.AnnAssign)
+                and isinstance(below, ast.Expr)
+                and isinstance(below.value, ast.Constant)
+            ):
+                words[ast.unparse(line.target)] = inspect.cleandoc(str(below.value.value))
+    return words
 
 
 def _types(says: Schema) -> list[str]:
@@ -171,6 +193,9 @@ def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
         if part == NAMES:
             inner = says["propertyNames"]["anyOf"][0]
         says = inner or says.get("items") or says.get("additionalProperties") or {}
-        says = next((kind for kind in says.get("anyOf", ()) if kind.keys() & {"$ref", "oneOf"}), says)  # else null
+        options = says.get("anyOf", ())
+        says = next((kind for kind in options if kind.keys() & {"$ref", "oneOf"}), says)  # else null
+        if {"type": "null"} in options and says.get("anyOf"):
+            says = next(kind for kind in options if kind["type"] != "null")
         says = whole["$defs"][says["$ref"].rpartition("/")[2]] if "$ref" in says else says
     return says, name

@@ -48,6 +48,8 @@ def _sections(schema: Schema, part: Schema, path: str, kind: str = "") -> Iterat
             (".NAME", says.get("additionalProperties") or {}),
             (".N", says.get("items") or {}),
         ):
+            if key == "uavs":  # with the keys of `uav`
+                continue
             for choice in below.get("oneOf", [below] if "$ref" in below else []):
                 inner = schema["$defs"][choice["$ref"].rpartition("/")[2]]
                 of = kind_of(inner) if "oneOf" in below else ""

@@ -19,7 +19,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenario import map_file, validate
 from airground_drake.scenario.document import Document, of_data, place_of, put, read, replace, simple, way
 from airground_drake.scenario.filled import filled
-from airground_drake.scenario.schema import SET, Scenario, Uav, Vector
+from airground_drake.scenario.schema import SET, UNNAMED, Scenario, Vector
 from airground_drake.scenario.shipped import shipped
 
 __all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
@@ -184,9 +184,15 @@ def _checked(document: Document) -> Scenario:
 
 
 def _complete(scenario: Scenario) -> None:
-    """Fill in UAVs' targets that are left out, and round gains of 1/period down so that gain * period <= 1."""
-    for uav in scenario.aerial.values():
-        uav.target_m = uav.target_m or _over_the_targets(scenario, uav)
+    """Fill in what UAVs leave out, and round gains of 1/period down so that gain * period <= 1."""
+    for name, uav in scenario.uavs.items():
+        uav.name = name if uav.name == UNNAMED else uav.name
+    without = [uav for uav in scenario.uavs.values() if not uav.ugvs]
+    if len(without) == 1:
+        taken = {ugv for uav in scenario.uavs.values() for ugv in uav.ugvs}
+        without[0].ugvs = [ugv for ugv in scenario.ugvs if ugv not in taken]
+    for name, uav in scenario.aerial.items():
+        uav.target_m = uav.target_m or _over_the_targets(scenario, name)
     control = scenario.control
     for name in validate.GAINS:
         setattr(control, name, _rounded_down(getattr(control, name), control.period_s))
@@ -212,11 +218,11 @@ def _rounded_down(gain: float, period: float) -> float:
     return gain
 
 
-def _over_the_targets(scenario: Scenario, uav: Uav) -> Vector:
-    """Where a UAV's task (9) leads when every UGV is at its target: over the centroid, [x, y, z], m."""
-    targets = [ugv.target_m for ugv in scenario.ugvs.values()]
+def _over_the_targets(scenario: Scenario, uav: str) -> Vector:
+    """Where a UAV's task (9) leads when its UGVs are at their targets: over the centroid, [x, y, z], m."""
+    targets = [scenario.ugvs[ugv].target_m for ugv in scenario.in_charge(uav) or scenario.ugvs]
     x, y = (sum(target[axis] for target in targets) / len(targets) for axis in range(2))
-    return [x, y, uav.altitude_m]
+    return [x, y, scenario.aerial[uav].altitude_m]
 
 
 def _put(document: Document, key: str, value: Any) -> None:

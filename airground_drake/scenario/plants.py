@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, TypeAdapter, Va
 
 from airground_drake.base.registry import AS_TOLD, PLANTS
 from airground_drake.base.values import RECORDED, refused
+from airground_drake.model.plants.budget import Bounds
 from airground_drake.model.plants.first_order import FirstOrder
 from airground_drake.model.plants.own import OwnKeys
 from airground_drake.model.plants.plant import Keys, Plant
@@ -55,6 +56,11 @@ def plant_of(robot: _Robot, period_s: float) -> Plant:
     for keys in reversed(robot.plant):
         plant = keys.made(period_s, plant)
     return plant or FirstOrder()
+
+
+def bounds_of(robot: Any, period_s: float, error_m: float) -> Bounds:
+    """How far a robot of a scenario may be from where the law steers it, and from where it is seen."""
+    return plant_of(robot, period_s).bounds(robot.max_speed_m_s)._replace(error_m=error_m)
 
 
 def made(given: list[dict[str, Any]], period_s: float) -> Plant:

@@ -109,10 +109,12 @@ def beside(source: str, *, allow: bool) -> Iterator[None]:
 def without(scenario: Scenario) -> Scenario:
     """The scenario with the package's own parts, without policies; its diagram has the same blocks."""
     plants = {name: [part for part in robot.plant if not part.is_own] for name, robot in scenario.robots.items()}
+    uav = scenario.uav and replace(scenario.uav, task="formation", plant=plants[scenario.uav.name])
     return replace(
         scenario,
         ugvs={name: replace(ugv, plant=plants[name]) for name, ugv in scenario.ugvs.items()},
-        uav=replace(scenario.uav, task="formation", plant=plants[scenario.uav.name]),
+        uav=uav,
+        uavs={name: replace(uav, task="formation", plant=plants[name]) for name, uav in scenario.uavs.items()},
         intervention=replace(scenario.intervention, policies=[]),
         ugv_controller=None,
         gatekeeper=replace(scenario.gatekeeper, route="mixed_integer", blocks=0, solver="daqp"),

@@ -25,9 +25,11 @@ from airground_drake.base.registry import (
     UGV_CONTROLLERS,
 )
 from airground_drake.base.values import (
+    Chance,
     Count,
     CountFromZero,
     Heading,
+    Loss,
     Name,
     NotNegative,
     Positive,
@@ -71,14 +73,20 @@ SHAPES = ("polygon_m", "segment_m", "size_m")
 ABOUT = ("size_m",)
 """Those of them that are about its position, which they need."""
 
+ERRORS: tuple[str, ...] = ("drawn", "adversarial", "away", "sideways")
 TRIGGERS: tuple[str, ...] = ("automaton", "bare")
 AT_END: tuple[str, ...] = ("stop", "reverse", "loop")
+UNNAMED = "uav"
+"""Name of a UAV that is given none."""
 SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
-OPTIONAL: tuple[str, ...] = ("ugv_controller",)
-"""Sections that a scenario need not have; without them, it is written and digested as if they did not exist."""
-SETTABLE: tuple[str, ...] = ("decision", "gatekeeper", "intervention")
+OPTIONAL: dict[str, object] = {
+    "channel": None, "sensing": None, "ugv_controller": None,
+    "uav": None, "uavs": {}, "ugvs": [], "lost_at_s": 0.0, "uav_m": 0.0,
+}  # fmt: skip
+"""Keys that may be left out, and their values then: a scenario is written and digested as if these did not exist."""
+SETTABLE: tuple[str, ...] = ("channel", "decision", "gatekeeper", "intervention")
 """Sections in which a run may set its own values. All runs share bodies, distances and controllers: a report draws them
 once, and proves safety once."""
 
@@ -114,20 +122,20 @@ class Ugv:
 
 @dataclass(slots=True)
 class Uav:
-    """The UAV, a robot in space whose `task` is to fly over the centroid of the UGVs, eqs (9)-(10).
+    """A UAV, a robot in space whose `task` is to fly over the centroid of its UGVs, eqs (9)-(10).
 
     Another task is named as `module:Class` or `file.py:Class`. `phantoms_m` are obstacles on its map that are
     not there, points without a radius. Its own body is a ball of radius `radius_m`.
     """
 
-    name: Name = "uav"
-    """Its name in traces and reports."""
+    name: Name = UNNAMED
+    """Its name in traces and reports; of one among `uavs` its key."""
     start_m: AirPoint = field(kw_only=True)
     """Where it starts."""
     target_m: AirPointOrNone = field(default_factory=list)
-    """Its target; left out or empty: over the centroid of the UGVs' targets, at `altitude_m`."""
+    """Its target; left out or empty: over the centroid of its UGVs' targets, at `altitude_m`."""
     altitude_m: Positive = 2.0
-    """Height over the centroid of the UGVs; more than `air_ground_m` plus both radii."""
+    """Height over the centroid of its UGVs; more than `air_ground_m` plus both radii."""
     task: Annotated[Words, registered(UAV_TASKS)] = "formation"
     """Its task, with lower priority than obstacle avoidance."""
     max_speed_m_s: Positive = 10.0
@@ -139,6 +147,11 @@ class Uav:
     plant: Plants = field(default_factory=list)
     """How it moves; by default as it is told. The law steers a point of it, and keeps what its body needs on top: see
     `airground budget`. A list combines a delay, and after it a lag."""
+    ugvs: list[Name] = field(default_factory=list)
+    """The UGVs that it is in charge of: it flies over their centroid, and intervenes on them only. Left out: all that
+    no other UAV lists."""
+    lost_at_s: NotNegative = 0.0
+    """From this time on it neither sends nor hears anything; it flies on. 0: never."""
 
 
 @dataclass(slots=True)
@@ -283,7 +296,9 @@ class SafeDistance:
     ugv_m: Positive = 2.0
     """Between two UGVs."""
     air_ground_m: Positive = 1.0
-    """Between the UAV and a UGV."""
+    """Between a UAV and a UGV."""
+    uav_m: NotNegative = 0.0
+    """Between two UAVs; needed with several."""
     collision_m: Positive = 0.05
     """A smaller distance counts as a collision; less than the other distances."""
 
@@ -304,6 +319,28 @@ class Control:
     """Gain of tracking an intervention, (14)."""
     sensing_range_m: Positive = 4.0
     """Robots sense nothing beyond it; it covers every safe distance, both radii and a period of closing speed."""
+
+
+@dataclass(slots=True)
+class Sensing:
+    """Measured positions: each robot publishes one, off by a bounded error, and all robots and gatekeepers act on it.
+
+    The law keeps as much more as that costs (`airground budget`), and robots stand where measured inequalities
+    contradict one another. 'drawn' errors change smoothly. 'adversarial' ones are at the bound: the nearest thing looks
+    farther ('away') or is seen in another direction ('sideways'), by turns of half a second. Beside obstacles that may
+    move nothing is promised then, and a scenario with both is refused.
+    """
+
+    position_error_m: NotNegative = 0.0
+    """Largest error of a robot's published position."""
+    errors: Annotated[Words, one_of(ERRORS)] = "drawn"
+    """How they come."""
+    correlation_s: Positive = 1.0
+    """Time after which a drawn error is a new one; in between it is linear."""
+    uav_error_m: NotNegative = 0.0
+    """Largest error of a UGV's position that the UAV plans with, drawn; no distance rests on it."""
+    seed: CountFromZero = 0
+    """Seed of the errors."""
 
 
 @dataclass(slots=True)
@@ -451,6 +488,51 @@ class Gatekeeper:
 
 
 @dataclass(slots=True)
+class WayBack:
+    """The way from UGVs to the UAV where it differs from the way there: what is left out is as there."""
+
+    delay_s: NotNegative | None = None
+    """How late every message is."""
+    jitter_s: NotNegative | None = None
+    """By how much more a message may be late, uniformly."""
+    loss: Loss | None = None
+    """Share of messages that are lost."""
+    burst_s: NotNegative | None = None
+    """Mean duration of a loss; 0: each message is lost for itself."""
+    duplicate: Chance | None = None
+    """Share of messages that arrive twice."""
+    reorder: YesNo | None = None
+    """Whether a message may overtake another one."""
+
+
+@dataclass(slots=True)
+class Channel:
+    """What happens to messages between UAV and UGVs. Without it they arrive at once, and none is lost.
+
+    The fate of a message depends on `seed`, its link, its number and how often it was sent before, and on nothing else:
+    with another delay the same messages are lost. Who waits for an answer repeats the message after twice the delay,
+    the jitter and 0.15 s. Robots see each other as they are: distances do not depend on messages.
+    """
+
+    delay_s: NotNegative = 0.0
+    """How late every message is."""
+    jitter_s: NotNegative = 0.0
+    """By how much more a message may be late, uniformly."""
+    loss: Loss = 0.0
+    """Share of messages that are lost."""
+    burst_s: NotNegative = 0.0
+    """Mean duration of a loss; 0: each message is lost for itself."""
+    duplicate: Chance = 0.0
+    """Share of messages that arrive twice."""
+    reorder: YesNo = True
+    """Whether a message may overtake another one."""
+    seed: CountFromZero = 1
+    """Decides which messages are lost, doubled and late."""
+    up: WayBack | None = None
+    """The way back, from UGVs to the UAV; by default it is as the way there."""
+
+
+@dataclass(slots=True)
 class Run:
     """One simulation: a method (see `airground list methods`) and what is expected of it.
 
@@ -529,6 +611,11 @@ class Choice:
     """The reason for the value."""
 
 
+def _written(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A mapping of a file, without optional keys that are left out."""
+    return {key: value for key, value in items if key not in OPTIONAL or value != OPTIONAL[key]}
+
+
 @dataclass(slots=True)
 class Scenario:
     """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays.
@@ -538,9 +625,7 @@ class Scenario:
     to those of the package: `module:Class` or `file.py:Class` by identifier.
     """
 
-    __pydantic_config__: ClassVar = ConfigDict(
-        extra="forbid", revalidate_instances="always", use_attribute_docstrings=True
-    )
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", revalidate_instances="always")
 
     name: Name
     """Its name: letters, digits and underscores."""
@@ -558,8 +643,10 @@ class Scenario:
     """A UGV must end within this distance of its point in `stalls_m`."""
     ugvs: Annotated[dict[Name, Ugv], Field(min_length=1, max_length=MAX_UGVS)] = field(kw_only=True)
     """The UGVs, 1 to 100, by name, in the order of all arrays."""
-    uav: Uav = field(kw_only=True)
-    """The UAV."""
+    uav: Uav | None = field(default=None, kw_only=True)
+    """The UAV; with several, `uavs` takes its place."""
+    uavs: dict[Name, Uav] = field(default_factory=dict, kw_only=True)
+    """Several UAVs by name, in place of `uav` and with its keys; each UGV is in the charge of one of them."""
     obstacles: dict[Name, Obstacle] = field(default_factory=dict)
     """The obstacles, by name."""
     arena_m: TwoCornersOrNone = field(default_factory=list)
@@ -572,12 +659,16 @@ class Scenario:
     """The controllers."""
     ugv_controller: OwnController | None = None
     """A controller of your own, in place of the package's."""
+    sensing: Sensing | None = None
+    """Errors of measured positions."""
     decision: Decision = field(default_factory=Decision)
     """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)
     """The UAV's intervention behaviours."""
     gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
     """The UGVs' decisions about proposals."""
+    channel: Channel | None = None
+    """What happens to messages; by default they arrive at once."""
     runs: Annotated[dict[Name, Run], Field(min_length=1)] = field(kw_only=True)
     """The simulations, by name."""
     claims: Annotated[dict[Words, Words], CLAIMS] = field(default_factory=dict)
@@ -591,13 +682,18 @@ class Scenario:
 
     def data(self) -> dict[str, Any]:
         """The scenario as nested dicts and lists, with all defaults."""
-        return {key: value for key, value in asdict(self).items() if value is not None or key not in OPTIONAL}
+        return asdict(self, dict_factory=_written)
 
     @property
     def digest(self) -> str:
         """SHA-256 of the scenario as nested dicts and lists in strict JSON, with all defaults and without spaces."""
         text = json.dumps(self.data(), separators=(",", ":"), allow_nan=False)
         return sha256(text.encode())
+
+    @property
+    def position_error_m(self) -> float:
+        """Bound of the error of a robot's published position, m; 0 without errors."""
+        return self.sensing.position_error_m if self.sensing else 0.0
 
     @property
     def barriers(self) -> dict[str, Obstacle]:
@@ -616,13 +712,18 @@ class Scenario:
 
     @property
     def aerial(self) -> dict[str, Uav]:
-        """The UAVs, by name."""
-        return {self.uav.name: self.uav}
+        """The UAVs, by name, whether they are in `uav` or in `uavs`."""
+        return dict(self.uavs) or ({self.uav.name: self.uav} if self.uav else {})
 
     @property
     def robots(self) -> dict[str, Ugv | Uav]:
         """The UGVs and then the UAVs, by name."""
         return {**self.ugvs, **self.aerial}
+
+    def in_charge(self, uav: str) -> tuple[str, ...]:
+        """The UGVs that a UAV is in charge of, in their order."""
+        listed = self.aerial[uav].ugvs
+        return tuple(ugv for ugv in self.ugvs if ugv in listed or not listed)
 
     def kind_of(self, name: str) -> Kind:
         """What the body of this name is.
@@ -639,7 +740,7 @@ class Scenario:
         raise KeyError(name)
 
     def pair_of(self, first: str, second: str) -> str:
-        """The kind of a pair of robots: `ugv` or `air_ground`; with `_m` the key of its safe distance."""
+        """The kind of a pair of robots: `ugv`, `uav` or `air_ground`; with `_m` the key of its safe distance."""
         kinds = {self.kind_of(first), self.kind_of(second)}
         return "air_ground" if len(kinds) == 2 else kinds.pop()
 
@@ -648,7 +749,7 @@ class Scenario:
         kind = self.kind_of(name)
         if name == MAP and kind == "obstacle" and name not in self.obstacles:
             return MAP
-        return "uav" if kind == "uav" else f"{kind}s.{name}"
+        return "uav" if kind == "uav" and not self.uavs else f"{kind}s.{name}"
 
     @property
     def bodies(self) -> dict[str, Ugv | Uav | Obstacle]:
@@ -657,5 +758,6 @@ class Scenario:
 
     def __repr__(self) -> str:
         """One line with the numbers of robots and obstacles, and the runs."""
-        things = f"{len(self.ugvs)} UGVs, the UAV, {len(self.obstacles)} obstacles"
+        uavs = f"{len(self.uavs)} UAVs" if self.uavs else "the UAV"
+        things = f"{len(self.ugvs)} UGVs, {uavs}, {len(self.obstacles)} obstacles"
         return f"<Scenario {self.name!r}: {things}, runs {', '.join(self.runs)}>"

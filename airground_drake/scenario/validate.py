@@ -52,8 +52,56 @@ def _one_of(key: str, value: str, allowed: Iterable[str], what: str) -> Problems
         yield key, value, f"{what} {', '.join(options) or '(none)'}"
 
 
+def _uavs(scenario: Scenario) -> Problems:
+    """There is a UAV, and several keep apart."""
+    if scenario.uav and scenario.uavs:
+        yield "uavs", Fault("uav is given, too"), "one of both: uavs has all UAVs by name"
+    if not scenario.aerial:
+        yield "uav", Fault("missing"), "wanted: a mapping with start_m, or several by name in uavs"
+    for name, uav in scenario.uavs.items():
+        if uav.name != name:
+            yield f"uavs.{name}.name", uav.name, f"{name}, its key, or no name"
+    if len(scenario.aerial) > 1 and not scenario.safe_distance.uav_m:
+        yield "safe_distance.uav_m", Fault("missing"), "wanted: the distance between two UAVs, a number above 0 in m"
+
+
+def _charges(scenario: Scenario) -> Problems:
+    """Each UGV is in the charge of one UAV."""
+    charged = dict[str, str]()
+    for name, uav in scenario.aerial.items():
+        for k, ugv in enumerate(uav.ugvs):
+            key = f"{scenario.key_of(name)}.ugvs.{k}"
+            yield from _one_of(key, ugv, scenario.ugvs, "one of the UGVs")
+            if ugv in charged:
+                elsewhere = f"it is in {scenario.key_of(charged[ugv])}.ugvs: leave it out of one list"
+                yield key, ugv, f"a UGV in nobody else's charge; {elsewhere} (no UAV hands a UGV over to another)"
+            charged[ugv] = name
+    without = [name for name, uav in scenario.uavs.items() if not uav.ugvs]
+    if without:
+        why = f"{without[1]} has none either" if len(without) > 1 else "the others' lists have all UGVs"
+        yield f"uavs.{without[0]}.ugvs", Fault("missing"), f"wanted: a list of UGVs that it is in charge of: {why}"
+    for ugv in scenario.ugvs if charged else ():
+        if ugv not in charged:
+            lists = " or ".join(f"{scenario.key_of(name)}.ugvs" for name in scenario.aerial)
+            allowed = f"wanted: in {lists}, or one UAV without a list, which gets the rest"
+            yield f"ugvs.{ugv}", Fault("in no UAV's charge"), allowed
+
+
+def _channel(scenario: Scenario) -> Problems:
+    """A channel is between one UAV, which is there to the end, and its UGVs."""
+    if scenario.channel is None:
+        return
+    if len(scenario.aerial) > 1:
+        yield "channel", Fault("of several UAVs"), "a channel of one UAV; with several messages arrive at once"
+    for name, uav in scenario.aerial.items():
+        if uav.lost_at_s:
+            key = f"{scenario.key_of(name)}.lost_at_s"
+            yield key, uav.lost_at_s, "0 with a channel; up: {loss: ...} with burst_s makes a UAV deaf for a time"
+
+
 def _names(scenario: Scenario) -> Problems:
-    keys = [*((f"ugvs.{name}", name) for name in scenario.ugvs), ("uav.name", scenario.uav.name)]
+    keys = [(f"ugvs.{name}", name) for name in scenario.ugvs]
+    keys += [(f"uavs.{name}" if scenario.uavs else "uav.name", name) for name in scenario.aerial]
     keys += [(f"obstacles.{name}", name) for name in scenario.obstacles]
     count = Counter(name for _, name in keys)
     yield from ((key, name, "a name that no other UGV, obstacle or UAV has") for key, name in keys if count[name] > 1)
@@ -280,7 +328,7 @@ def _release(scenario: Scenario) -> Problems:
 
 def _distances(scenario: Scenario) -> Problems:
     safe = scenario.safe_distance
-    for name in ("obstacle_m", "ugv_m", "air_ground_m", *(["moving_m"] if safe.moving_m else [])):
+    for name in ("obstacle_m", "ugv_m", "air_ground_m", *(key for key in ("moving_m", "uav_m") if getattr(safe, key))):
         if not safe.collision_m < getattr(safe, name):
             allowed = f"less than safe_distance.{name} = {getattr(safe, name):.9g} m"
             yield "safe_distance.collision_m", safe.collision_m, allowed
@@ -343,7 +391,8 @@ def _nearest_pairs(scenario: Scenario) -> list[tuple[Apart, _Body, _Body]]:
         _Body(body.radius_m, body.expected_speed_m_s, body.radius_m, name) for name, body in scenario.barriers.items()
     ]
     pairs = [(_apart(scenario, "air_ground_m"), uavs[0], ugvs[0])]
-    pairs += [(_apart(scenario, "ugv_m"), first, second) for first, second in pairwise(ugvs[:2])]
+    for kind, robots in (("ugv_m", ugvs), ("uav_m", uavs)):
+        pairs += [(_apart(scenario, kind), first, second) for first, second in pairwise(robots[:2])]
     return [*pairs, *((apart_of(scenario, body.name), max(uavs[0], ugvs[0]), body) for body in fixed)]
 
 
@@ -458,7 +507,7 @@ def _clearances(scenario: Scenario) -> Problems:
                 if gap < least - TOLERANCE:
                     what = f"{verb} {gap:.9g} m from {name}{_filled(scenario) if name == MAP else ''}"
                     yield _too_near(robot, attribute, what, kind, least)
-        for robots, others, kind in ((ugvs, ugvs, "ugv_m"), (uavs, ugvs, "air_ground_m")):
+        for robots, others, kind in ((ugvs, ugvs, "ugv_m"), (uavs, ugvs, "air_ground_m"), (uavs, uavs, "uav_m")):
             least = getattr(scenario.safe_distance, kind)
             for robot, other in _within(robots, others, least - TOLERANCE):
                 gap = math.dist(robot.point, other.point) - (robot.radius + other.radius)
@@ -480,6 +529,26 @@ def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -
     for i, j in np.argwhere(apart < distance + np.add.outer(radii, other_radii)).tolist():
         if these is not those or j < i:
             yield these[i], those[j]
+
+
+def _measured(scenario: Scenario) -> Problems:
+    """The law bears the errors of measured positions: its gain is large enough, and nothing may move by itself."""
+    if not (error_m := scenario.position_error_m):
+        return
+    key, control = "sensing.position_error_m", scenario.control
+    for name, barrier in scenario.barriers.items():
+        if barrier.expected_speed_m_s:
+            yield key, error_m, f"0: {name} may move, and nothing is promised beside it where positions are measured"
+    for run, spec in scenario.runs.items():
+        if spec.composition != "augmented":
+            yield f"runs.{run}.composition", spec.composition, f"augmented: robots stand where {key} asks for it"
+    for pair in budget(scenario):
+        share = decimal(control.avoidance_gain_1_s) * decimal(control.period_s)
+        if share < pair.least_gain:
+            both = " (each may have to stand for the other)" if pair.second in scenario.robots else ""
+            why = f"{pair.promised_m:.9g} m between {pair.first} and {pair.second} with errors of {error_m:.9g} m{both}"
+            needed = _shown(Fraction(pair.least_gain) / decimal(control.period_s), ROUND_CEILING)
+            yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"at least {needed} 1/s for {why}"
 
 
 def _budget(scenario: Scenario) -> Problems:
@@ -511,7 +580,8 @@ def _budget(scenario: Scenario) -> Problems:
             if apart < pair.gap_m - TOLERANCE:
                 yield key, Fault(needs), f"they {verb} {apart:.2f} m apart. Largest term: {pair.largest}"
         speed = other.expected_speed_m_s if other else robots[pair.second].max_speed_m_s
-        reach = pair.law_m + (robots[pair.first].max_speed_m_s + speed) * period
+        unsure_m = scenario.position_error_m * (2.0 if pair.second in robots else 1.0)
+        reach = pair.law_m + unsure_m + (robots[pair.first].max_speed_m_s + speed) * period
         if scenario.control.sensing_range_m < reach:
             allowed = (
                 f"control.sensing_range_m must be at least {reach + TOLERANCE:.9g} m. Largest term: {pair.largest}"
@@ -558,6 +628,6 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends, _gains, _periods,
-    _release, _distances, _sensing, _extent, _clearances, _budget, _reproduction, _choices,
+    _uavs, _charges, _channel, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends,
+    _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget, _reproduction, _choices,
 )  # fmt: skip

@@ -19,13 +19,15 @@ def make_world(scenario: Scenario) -> World:
     """All bodies of a scenario, and the distances that they keep."""
     safe = scenario.safe_distance
     control = scenario.control
-    robots = [_robot(name, "ugv", ugv, control.period_s) for name, ugv in scenario.ugvs.items()]
-    robots += [_robot(name, "uav", uav, control.period_s) for name, uav in scenario.aerial.items()]
+    about = control.period_s, scenario.position_error_m
+    robots = [_robot(name, "ugv", ugv, *about) for name, ugv in scenario.ugvs.items()]
+    robots += [_robot(name, "uav", uav, *about) for name, uav in scenario.aerial.items()]
     obstacles = [_obstacle(scenario, name, body) for name, body in scenario.barriers.items()]
     obstacles.sort(key=lambda body: body.plant is None)
     apart: dict[frozenset[Kind], float] = {
         frozenset(("ugv",)): safe.ugv_m,
         frozenset(("ugv", "uav")): safe.air_ground_m,
+        frozenset(("uav",)): safe.uav_m,
     }
     return World((*robots, *obstacles), apart, control.avoidance_gain_1_s)
 
@@ -41,7 +43,8 @@ def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:
     )  # fmt: skip
 
 
-def _robot(name: str, kind: Kind, given: Ugv | Uav, period_s: float) -> Body:
+def _robot(name: str, kind: Kind, given: Ugv | Uav, period_s: float, error_m: float) -> Body:
     plant = plant_of(given, period_s)
     start = plant.steered(np.array(given.start_m, dtype=np.float64))
-    return Body(name, kind, start, outline.balls(np.zeros(3), given.radius_m), plant, given.max_speed_m_s)
+    shape = outline.balls(np.zeros(3), given.radius_m)
+    return Body(name, kind, start, shape, plant, given.max_speed_m_s, error_m=error_m)

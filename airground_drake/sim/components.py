@@ -22,8 +22,9 @@ from airground_drake.scenario.budget import budget, takes_room
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
-from airground_drake.scenario.schema import Decision, Scenario, Uav
+from airground_drake.scenario.schema import Channel, Decision, Scenario, Uav, WayBack
 from airground_drake.scenario.world import make_world
+from airground_drake.uav.channel import Link, Quality
 from airground_drake.uav.database import BehaviourDatabase, make_policy
 from airground_drake.uav.planner import Mover, Planner, Sender
 from airground_drake.ugv.answer import Rules
@@ -38,18 +39,43 @@ from airground_drake.ugv.routes.route import Route
 
 # Times of vertices that are this close (s, or relative) are equal but for rounding: they are sums of quotients.
 SAME_TIME = 1e-12
+ANSWERING_S = 0.15  # time that an answer may take besides its way, s
 
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
     """The set-based avoidance layer."""
     control = scenario.control
-    return Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition)
+    stands = scenario.position_error_m > 0.0
+    return Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition, stands)
 
 
 def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:
     """The control law of the UGVs under a method."""
     control, avoidance = scenario.control, make_avoidance(scenario, composition)
     return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
+
+
+def make_qualities(channel: Channel) -> tuple[Quality, Quality]:
+    """The ways from the UAV to UGVs, and back."""
+    there = {name: getattr(channel, name) for name in Quality._fields}
+    up = channel.up or WayBack()
+    back = {name: value for name in Quality._fields if (value := getattr(up, name)) is not None}
+    return Quality(**there), Quality(**{**there, **back})
+
+
+def make_links(channel: Channel) -> tuple[Link, Link]:
+    """The links from the UAV to UGVs, and back."""
+    down, up = make_qualities(channel)
+    return Link(down, channel.seed, "down"), Link(up, channel.seed, "up")
+
+
+def repeats_after(scenario: Scenario) -> float:
+    """After how long a message is repeated to which no answer has come, s; without a channel never."""
+    if scenario.channel is None:
+        return np.inf
+    down, up = make_qualities(scenario.channel)
+    answering = max(ANSWERING_S, scenario.gatekeeper.period_s + 2.0 * scenario.control.period_s)
+    return down.delay_s + up.delay_s + max(down.jitter_s, up.jitter_s) + answering
 
 
 def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:
@@ -83,6 +109,9 @@ def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:
             plant_of(ugv, scenario.control.period_s).trails(ugv.max_speed_m_s) for ugv in scenario.ugvs.values()
         ),
         sender=Sender(uav, first=[*scenario.aerial].index(uav), step=len(scenario.aerial)),
+        lead=scenario.channel.delay_s if scenario.channel else 0.0,
+        charge=tuple(ugv in scenario.in_charge(uav) for ugv in scenario.ugvs),
+        lost_at=scenario.aerial[uav].lost_at_s or np.inf,
     )
 
 

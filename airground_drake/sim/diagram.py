@@ -27,8 +27,10 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import (
+    AllProposals,
     DecisionVariable,
     DirectAcceptance,
+    Downlink,
     EventTrigger,
     Gatekeeper,
     InterventionPlanner,
@@ -36,19 +38,22 @@ from airground_drake.sim.blocks import (
     Monitor,
     UavController,
     UgvController,
+    Uplink,
     VelocityDisturbance,
 )
 from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvController
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
+from airground_drake.sim.blocks.sensing import Errors, PositionSensing
 
 # Exported output ports of the diagram: the signals of a trace.
 RECORDED = (
     "bodies", "team_command", "reference", "noise", "decision_variable", "status", "executing",
 )  # fmt: skip
 # Further exported output ports: of robots that are not where the law steers them, of users' plants that have a heading,
-# and of unicycles.
-OF_PLANTS = ("plant_signals", "own_headings", "command_share")
+# of unicycles, and of measured positions.
+OF_SOME = ("plant_signals", "own_headings", "command_share", "published", "seen_by_uav")
 
+NO_NAMES: Mapping[str, str] = MappingProxyType({})
 NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
 
 # Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
@@ -70,6 +75,8 @@ class Model:
     controllers: tuple[UgvController | OwnUgvController | UavController, ...]  # of the UGVs, and of each UAV
     signals: tuple[str, ...]  # names of the columns of `plant_signals` and `own_headings`
     recorded: tuple[str, ...]  # names of the exported output ports that are the signals of a trace
+    links: tuple[Downlink, Uplink] | None = None  # the channel
+    answering: Gatekeeper | DirectAcceptance | None = None  # the UGVs on it
 
 
 def build_diagram(
@@ -140,31 +147,45 @@ def build_model(
     made = {body.name: plant_system(body, scenario.control.period_s, plants) for body in world.moving}
     signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))
     vehicles = _vehicles(world, made, disturbed=disturbed)
+    channel, period = scenario.channel if chosen.intervenes else None, scenario.control.period_s
+    plans = {uav: components.make_planner(scenario, chosen, uav) for uav in scenario.aerial}
     planners = {
-        uav: InterventionPlanner(components.make_planner(scenario, chosen, uav), world, scenario.control.period_s)
-        for uav in scenario.aerial
+        uav: InterventionPlanner(planner, world, period, channel=channel is not None, alone=len(plans) == 1)
+        for uav, planner in plans.items()
     }
-    gatekeeper = None
+    gatekeeper, retry = None, components.repeats_after(scenario)
     if chosen.gated:
-        periods = {"period": scenario.gatekeeper.period_s, "control": scenario.control.period_s}
-        gatekeeper = Gatekeeper(make_gatekeepers(scenario, law), world, **periods)
-    answering = DirectAcceptance(n) if gatekeeper is None else gatekeeper
-    answers = {name: answering.GetOutputPort(name) for name in ("answers", "reports")}
+        gatekeeper = Gatekeeper(
+            make_gatekeepers(scenario, law), world, period=scenario.gatekeeper.period_s, control=period,
+            retry=retry if channel else None,
+        )  # fmt: skip
+    answering = gatekeeper or DirectAcceptance(n, channel_period=period if channel else None)
+    answers = {port.get_name(): port for port in _outputs(answering) if not (channel and port.get_name() == "reports")}
     own = scenario.ugv_controller
     ugvs = OwnUgvController(own, world, law, ugv_controller) if own else UgvController(world, law)
     uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
+    # input ports of the parts for which `bodies` are positions as measured
+    measured = {"bodies": "published"} if scenario.sensing else {}
     parts = {
         "decision_making": decision,
-        "task_planning": _task_planning(presets, planners, ugvs, uavs),
-        "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers),
+        "task_planning": _task_planning(presets, planners, ugvs, uavs, measured),
+        "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers, renamed={answering: measured}),
         "vehicles": vehicles,
     }
+    links = None
+    if channel:
+        down, up = components.make_links(channel)
+        (planner,) = plans.values()
+        links = Downlink(down, planner.start(), period, retry), Uplink(up, period)
+        parts |= {"downlink": links[0], "uplink": links[1]}
+    if scenario.sensing:
+        parts["sensing"] = PositionSensing(Errors(scenario.sensing, world), world)
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
     if isinstance(ugvs, OwnUgvController):
         ugvs.require_inputs(named)
-    recorded = (*RECORDED, *(name for name in OF_PLANTS if name in named))
+    recorded = (*RECORDED, *(name for name in OF_SOME if name in named))
     exported = [*recorded, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
     return Model(
@@ -177,6 +198,8 @@ def build_model(
         controllers=(ugvs, *uavs.values()),
         signals=signals,
         recorded=recorded,
+        links=links,
+        answering=answering,
     )
 
 
@@ -220,6 +243,7 @@ def _task_planning(
     planners: Mapping[str, InterventionPlanner],
     ugvs: UgvController | OwnUgvController,
     uavs: Mapping[str, UavController],
+    measured: Mapping[str, str],
 ) -> Diagram:
     """The task planning layer: preset trajectories, planners, controllers."""
     times, places = components.stack_presets(list(presets))
@@ -228,17 +252,29 @@ def _task_planning(
     systems |= {name: planners[uav] for uav, name in _named("intervention_planner", planners).items()}
     systems |= {"ugv_controller": ugvs}
     systems |= {name: uavs[uav] for uav, name in _named("uav_controller", uavs).items()}
-    (planner,), (uav,) = planners.values(), uavs.values()
+    asks: System
+    flies: System
+    wires = []
+    if len(uavs) == 1:
+        (asks,), (flies,) = planners.values(), uavs.values()
+    else:
+        asks, flies = AllProposals([*uavs], len(presets)), Multiplexer([3] * len(uavs))
+        systems |= {"all_proposals": asks, "uav_command": flies}
+        for k, uav in enumerate(uavs):
+            wires.append((planners[uav].GetOutputPort("proposals"), asks.GetInputPort(f"proposals_{uav}")))
+            wires.append((uavs[uav].GetOutputPort("command"), flies.get_input_port(k)))
     named = {
         "reference": reference.get_output_port(),
-        "proposals": planner.GetOutputPort("proposals"),
+        **{port.get_name(): port for port in _outputs(asks)},
         "ugv_command": ugvs.GetOutputPort("command"),
         "executing": ugvs.GetOutputPort("executing"),
         **({"command_share": ugvs.GetOutputPort("command_share")} if ugvs.HasOutputPort("command_share") else {}),
         "gains": ugvs.GetOutputPort("gains"),
-        "uav_command": uav.GetOutputPort("command"),
+        "uav_command": flies.get_output_port(0),
     }
-    return _assembled("task_planning", systems, named)
+    renamed: dict[System, Mapping[str, str]] = dict.fromkeys([ugvs, *uavs.values()], measured)
+    renamed |= dict.fromkeys(planners.values(), dict.fromkeys(measured, "seen_by_uav"))
+    return _assembled("task_planning", systems, named, None, wires, renamed=renamed)
 
 
 def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:
@@ -299,9 +335,11 @@ def _assembled(
     named: Mapping[str, OutputPort],
     exported: Iterable[str] | None = None,
     wires: Iterable[tuple[OutputPort, InputPort]] = (),
+    renamed: Mapping[System, Mapping[str, str]] = MappingProxyType({}),
 ) -> Diagram:
     """A Diagram of systems by name, in which input ports are fed by name."""
     # exported: which of `named` become output ports of the diagram; default: all.
+    # renamed: of some systems, what feeds an input port of a name.
     builder = DiagramBuilder()
     for key, system in systems.items():
         builder.AddNamedSystem(key, system)
@@ -309,7 +347,7 @@ def _assembled(
         builder.Connect(source, target)
     inputs = set()
     for port in (system.get_input_port(i) for system in systems.values() for i in range(system.num_input_ports())):
-        wanted = port.get_name()
+        wanted = renamed.get(port.get_system(), NO_NAMES).get(port.get_name(), port.get_name())
         if builder.IsConnectedOrExported(port):
             continue
         if wanted in named:
@@ -347,12 +385,15 @@ def make_monitor(
 
     Raises:
         ScenarioError, UnknownNameError, PluginError: as `build_diagram`; also if the UGVs have a controller of the
-            user's: no law is known that it must obey.
+            user's, whose law is not known, or act on measured positions, which a monitor does not see.
     """
     scenario = validated(scenario)
     if scenario.ugv_controller is not None:
         told = f"ugv_controller {scenario.ugv_controller.kind!r} has no law that is known here"
         raise PluginError(f"{told}; allowed for a monitor: a scenario without one")
+    if scenario.sensing is not None:
+        told = f"sensing of scenario {scenario.name!r} has errors, and a monitor sees true positions"
+        raise PluginError(f"{told}; allowed: a scenario without sensing")
     chosen, composition = _chosen(scenario, method, composition)
     world = make_world(scenario)
     ugvs = UgvController(world, components.make_law(scenario, chosen, composition))
@@ -370,6 +411,7 @@ def _uav_controller(scenario: Scenario, world: World, name: str) -> UavControlle
         world,
         components.make_avoidance(scenario),
         uav=name,
+        ugvs=scenario.in_charge(name),
         task=UAV_TASKS.load(uav.task, of=Task),
         gain=scenario.control.formation_gain_1_s,
         altitude=uav.altitude_m,

@@ -26,7 +26,7 @@ HIDDEN = "noise_source"  # a block without inputs that would take a column of it
 # Blocks from left to right. A wire to the left is drawn after its ends have their places.
 ORDER = (
     "vehicles", "reference", "decision_noise", "decision_variable", "event_trigger", "intervention_planner",
-    "gatekeeper", "ugv_controller", "uav_controller",
+    "all_proposals", "gatekeeper", "ugv_controller", "uav_controller",
 )  # fmt: skip
 COLUMNS = (ORDER[:3], ORDER[-2:])  # blocks that stand below each other
 # What a system does, by the name of its class. The picture shows the class name of any other system.
@@ -35,6 +35,7 @@ REALISES = {
     "DecisionVariable": "DDM, (15)",
     "EventTrigger": "threshold, (20)",
     "InterventionPlanner": "proposals, (12)-(14)",
+    "AllProposals": "what UAVs ask",
     "MixedIntegerRoute": "MPC, (21)-(26)",
     "RelaxedRoute": "MPC, relaxed, (27)-(29)",
     "NonlinearRoute": "MPC, relaxed, (27)-(29)",
@@ -50,7 +51,7 @@ RECORDED, INK, MUTED = "#0060a8", "#1a1a1a", "#666666"
 # Which blocks fly and which drive. A wire between them is a radio link.
 ABOARD = {
     "decision_noise": "UAV", "decision_variable": "UAV", "event_trigger": "UAV", "intervention_planner": "UAV",
-    "uav_controller": "UAV", "gatekeeper": "UGVs", "ugv_controller": "UGVs",
+    "uav_controller": "UAV", "all_proposals": "UAV", "gatekeeper": "UGVs", "ugv_controller": "UGVs",
 }  # fmt: skip
 LEGEND = "dashed: sent between UAV and UGVs, grey: from the vehicles, blue: recorded"
 WIDTH_IN = 10.9  # maximum width of a picture: that of a landscape page of A4 with margins of 1 cm
@@ -104,7 +105,8 @@ def dot(diagram: Diagram) -> str:
     for layer, color in LAYERS.items():
         look = f'style=filled; color="{color}"; label=<<B>{layer.replace("_", " ").capitalize()}</B>>'
         lines.append(f'subgraph "cluster_{layer}" {{ {look}; {"; ".join(n for n in shown[layer] if n in blocks)} }}')
-    lines += [f"{{ rank=same; {'; '.join(column)} }}" for column in COLUMNS]
+    columns = [[n for sort in column for n in blocks if _sort(n) == sort] for column in COLUMNS]
+    lines += [f"{{ rank=same; {'; '.join(column)} }}" for column in columns]
     return "\n".join([*lines, *(_edge(start, end, blocks) for start, end in wires), "}", ""])
 
 
@@ -112,11 +114,17 @@ def _block(port: str) -> str:
     return port.partition(":")[0]
 
 
+def _sort(block: str) -> str:
+    """The name of a block, without that of the UAV which has it among several."""
+    return next((sort for sort in ABOARD if block.startswith(f"{sort}_")), block)
+
+
 def _node(name: str, system: System, text: str, recorded: Set[str], fed_unseen: Set[str]) -> str:
     """Drake's text of a block, with what it does and where in place of its class."""
     # Without inputs for disturbances, and without names of inputs that are fed by a hidden block.
     kind = str(getattr(system, "judges", type(system).__name__.rstrip("_")))
-    says = escape(REALISES.get(kind, kind)) + (f"<BR/><I>on the {ABOARD[name]}</I>" if name in ABOARD else "")
+    aboard = ABOARD.get(_sort(name))
+    says = escape(REALISES.get(kind, kind)) + (f"<BR/><I>on the {aboard}</I>" if aboard else "")
     text = _HEAD.sub(f"<B>{name}</B><BR/>{says}", _DISTURBANCE.sub("", text))
     for port in (port for port in recorded | fed_unseen if _block(port) == name):
         cell = re.compile(rf'(PORT="{port.partition(":")[2]}"[^>]*>)(\w+)')
@@ -127,11 +135,11 @@ def _node(name: str, system: System, text: str, recorded: Set[str], fed_unseen: 
 
 def _edge(start: str, end: str, blocks: Mapping[str, System]) -> str:
     """A wire from an output port of a block to an input port."""
-    order = [*ORDER, *blocks]
+    order = [*ORDER, *map(_sort, blocks)]
     looks = {
-        "style=dashed": {ABOARD.get(_block(port)) for port in (start, end)} == {"UAV", "UGVs"},
+        "style=dashed": {ABOARD.get(_sort(_block(port))) for port in (start, end)} == {"UAV", "UGVs"},
         f'color="{MUTED}"': _block(start) == ORDER[0],
-        "constraint=false": order.index(_block(end)) < order.index(_block(start)),
+        "constraint=false": order.index(_sort(_block(end))) < order.index(_sort(_block(start))),
     }
     return f"{start}:e -> {end}:w [{', '.join(look for look, holds in looks.items() if holds)}]"
 

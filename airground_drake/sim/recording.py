@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ from airground_drake.sim.tables import (
     typed,
 )
 from airground_drake.sim.trace import Trace
+from airground_drake.uav.channel import Delivery, Message, Transit
 from airground_drake.uav.database import Asked
 from airground_drake.uav.planner import PlannerState
 from airground_drake.uav.policy import Proposal
@@ -48,6 +50,7 @@ class Done(NamedTuple):
     until_s: float
     wall_s: float  # duration by the clock
     meta: Mapping[str, Any]  # what only the simulation knows
+    carried: Sequence[tuple[Transit, Sequence[float]]] = ()  # by each link, and when what arrived was read, s
 
 
 MERGE_S = 1e-9  # rows closer than this are merged, s: periods that are not binary fractions give steps of about 1e-17 s
@@ -87,7 +90,9 @@ def trace_of(
         proposals=proposals(ugvs, done.memories.values()),
         plans=plans(done.memories, ugvs),
     )
-    trace = replace(trace, messages=messages(done.memories.values(), trace))
+    memories = done.memories.values()
+    sent = carried(memories, done.carried, ugvs) if done.carried else messages(memories, trace)
+    trace = replace(trace, messages=sent)
     trace.derived("scenario", lambda: given)  # it need not be read from the metadata
     meta["events"] = extract(trace)
     return trace
@@ -147,10 +152,14 @@ def samples(
     columns: dict[str, Array] = {"t_s": t[at]}
     for i, robot in enumerate(robots):
         columns |= {f"{robot}.v{axis}_m_s": chosen[3 * i + a] for a, axis in enumerate("xyz")}
+        if "published" in logged:
+            columns |= {f"{robot}.seen_{axis}_m": logged["published"][3 * i + a, at] for a, axis in enumerate("xyz")}
     for i, ugv in enumerate(ugvs):
         columns |= {f"{ugv}.ref_{axis}_m": reference[3 * i + a] for a, axis in enumerate("xyz")}
         columns |= {f"{ugv}.ref_v{axis}_m_s": reference[3 * (len(ugvs) + i) + a] for a, axis in enumerate("xyz")}
         columns[f"{ugv}.executing"] = logged["executing"][i, at + 1]
+        if "seen_by_uav" in logged:
+            columns |= {f"{ugv}.uav_saw_{axis}_m": logged["seen_by_uav"][3 * i + a, at] for a, axis in enumerate("xyz")}
         if "command_share" in logged:
             columns[f"{ugv}.command_share"] = logged["command_share"][i, at + 1]
     return pd.DataFrame(columns)
@@ -188,8 +197,6 @@ def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str,
         "known": list(rested_on.known),
         "new": list(rested_on.new),
         "told": list(rested_on.told),
-        "asked": [number for number, _ in rested_on.asked],
-        "asked_accepted": [int(accepted) for _, accepted in rested_on.asked],
     }
     solution = decision.solution
     if solution is None:
@@ -308,8 +315,8 @@ def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[s
         uav, ugv = parties[about]
         sender, receiver = (ugv, uav) if kind == "answer" else (uav, ugv)
         return {
-            "kind": kind, "number": number, "copy": 0, "sender": sender, "receiver": receiver, "about": about,
-            "sent_s": sent_s, "received_s": sent_s, "read_s": read_s,
+            "kind": kind, "number": number, "attempt": 0, "copy": 0, "sender": sender, "receiver": receiver,
+            "about": about, "sent_s": sent_s, "received_s": sent_s, "read_s": read_s,
         }  # fmt: skip
 
     read, never = dict(read for memory in memories for read in memory.read), float("nan")
@@ -329,6 +336,41 @@ def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[s
     told = trace.decisions[trace.decisions["answer"] >= 0]
     for t, answer, number in zip(*(told[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
         yield row("answer", answer, number, t, read.get(answer, never))
+
+
+def carried(
+    memories: Iterable[PlannerState], links: Sequence[tuple[Transit, Sequence[float]]], ugvs: Sequence[str]
+) -> pd.DataFrame:
+    """`Trace.messages` of a run with a channel, from what the links carried."""
+    uavs = {proposal.number: proposal.sender for _, proposal in _sent([*memories])}
+    rows = [
+        _row(delivery.message, delivery.copy, received_s, read_s, uavs[delivery.message.about], ugvs)
+        for transit, read in links
+        for delivery, received_s, read_s in _deliveries(transit, read)
+    ]
+    return typed(sorted(rows, key=lambda row: (row["sent_s"], _ORDER.index(row["kind"]))), MESSAGE_COLUMNS)
+
+
+def _deliveries(transit: Transit, read: Sequence[float]) -> Iterator[tuple[Delivery, float, float]]:
+    """What a link carried or lost; when it arrived and was read, s."""
+    never = float("nan")
+    unread = (never for _ in transit.arrived)
+    for delivery, read_s in zip(transit.arrived, chain(read, unread), strict=False):
+        yield delivery, delivery.received_s, read_s
+    yield from ((delivery, never, never) for delivery in transit.under_way)
+    yield from ((Delivery(never, -1, 0, message), never, never) for message in transit.lost)
+
+
+def _row(
+    message: Message, copy: int, received_s: float, read_s: float, uav: str, ugvs: Sequence[str]
+) -> dict[str, Any]:
+    ugv = ugvs[message.ugv]
+    sender, receiver = (ugv, uav) if message.kind == "answer" else (uav, ugv)
+    return {
+        "kind": message.kind, "number": message.number, "attempt": message.attempt, "copy": copy, "sender": sender,
+        "receiver": receiver, "about": message.about, "sent_s": message.sent_s, "received_s": received_s,
+        "read_s": read_s,
+    }  # fmt: skip
 
 
 def faults(memories: Mapping[str, PlannerState]) -> list[dict[str, Any]]:

@@ -34,6 +34,7 @@ from airground_drake.sim.components import GatekeepersFactory, make_gatekeepers
 from airground_drake.sim.diagram import NO_PLANTS, DecisionFactory, Model, build_model
 from airground_drake.sim.recording import Done, trace_of
 from airground_drake.sim.trace import Trace
+from airground_drake.uav.channel import Transit
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import GatekeeperDecision
 from airground_drake.ugv.outcome import Outlook, outcomes
@@ -200,8 +201,19 @@ class Recorder:
                 **read_back(model, context),
                 "decision_block": "" if (kind := type(model.decision_block)) is DecisionVariable else kind.__qualname__,
             },
+            carried=carried_by(model, context),
         )
         return trace_of(self._scenario, self._name, model.world, done, model.signals, self._own_plants)
+
+
+def carried_by(model: Model, root: Context) -> list[tuple[Transit, tuple[float, ...]]]:
+    """What each link of the channel carried, and when what arrived was read, s; empty without a channel."""
+    if model.links is None or model.answering is None:
+        return []
+    down, up = model.links
+    there = down.now(down.GetMyContextFromRoot(root))
+    desk = model.answering.desk(model.answering.GetMyContextFromRoot(root))
+    return [(there.transit, desk.read_s), (up.now(up.GetMyContextFromRoot(root)), there.read_s)]
 
 
 def read_back(model: Model, root: Context) -> dict[str, Any]:

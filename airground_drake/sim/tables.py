@@ -42,7 +42,7 @@ DECISION_COLUMNS = {
     "accept_left_m": "float64",
     "tries": "float64",
 }
-DECISION_LISTS = ("sensed", "known", "new", "told", "asked", "asked_accepted")
+DECISION_LISTS = ("sensed", "known", "new", "told")
 """Columns of `Trace.decisions`, one row per robot and gatekeeper call; -1 where a number does not apply. `number` is
 that of `Trace.proposals`, `answer` that of the answer in `Trace.messages` that told the UAV of the decision, -1 where
 it changed nothing. Columns up to
@@ -60,8 +60,7 @@ order of the scenario:
 - known: obstacles sensed so far and not seen to be gone (method (d)).
 - new: obstacles sensed for the first time that are not on the proposal's map (method (d)).
 - told: rows of the proposal's map that were believed (method (d)).
-- asked, asked_accepted: numbers of the proposals that other UGVs had and had not refused, and whether they had accepted
-  them, 0 or 1 (method (d))."""
+Of other UGVs a prediction knows where they are, how fast they go, and what the same joint plan asks of them."""
 
 PROBLEM_SCALARS = ("dt_s", "error_weight_1_m2_s", "slack_weight_1_m2_s", "terminal_weight_s")
 PROBLEM_ARRAYS = (
@@ -92,6 +91,7 @@ PROPOSAL_COLUMNS = (
 MESSAGE_COLUMNS = {
     "kind": "str",
     "number": "int64",
+    "attempt": "int64",
     "copy": "int64",
     "sender": "str",
     "receiver": "str",
@@ -103,12 +103,15 @@ MESSAGE_COLUMNS = {
 """Columns of `Trace.messages`, one row per delivery, by time of sending:
 - kind: proposal, withdrawal or answer. A proposal that is replaced is withdrawn.
 - number: counts the messages of its kind; for a proposal it is that of `Trace.proposals`.
-- copy: 0, or how often the message was delivered before.
+- attempt: 0, or how often the message was sent before: who waits for an answer repeats.
+- copy: 0, or 1 for a message that the channel doubled.
 - sender, receiver: names of robots.
 - about: number of the proposal.
-- sent_s, received_s, read_s: times, s; NaN for a message that was lost, or never read. A UGV reads a proposal when its
-  gatekeeper decides on it for the first time, and answers when its answer changes or it senses an obstacle that the UAV
-  does not know. Under method (b) it reads it when it begins to execute it, and does not answer."""
+- sent_s, received_s, read_s: times, s; NaN for a message that was lost, that did not arrive before the end, or that was
+  never read. A UGV reads a proposal when its gatekeeper decides on it for the first time, and answers when its answer
+  changes or it senses an obstacle that the UAV does not know. Under method (b) it reads it when it begins to execute
+  it, and does not answer. With a channel UGVs answer every message that they read, withdrawals too: such an answer
+  belongs to no decision."""
 
 PLAN_COLUMNS = {"t_s": "float64", "uav": "str", "ugv": "str", "policy": "str", "outcome": "str", "reason": "str"}
 """Columns of `Trace.plans`, one row per policy that was asked for a plan for a UGV: the outcome is proposed, passed
@@ -120,7 +123,7 @@ SEEN_COLUMNS = {
     "measured_s": "float64",
 }  # fmt: skip
 """Columns of `Trace.seen`: where a robot saw a body at a control sample, if not at its true place of that instant, and
-when it measured that. Simulated robots see true places: the table is empty."""
+when it measured that. For simulated robots the table is empty: see `samples` for what they publish of positions."""
 
 TABLES = ("states", "samples", "seen", "messages", "proposals", "plans", "decisions", "problems")
 """Attributes of `Trace` that are tables, each saved as a Parquet file of its name."""

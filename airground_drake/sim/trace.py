@@ -29,6 +29,8 @@ chose, which is held until the next sample.
     <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
     <ugv>.ref_vx_m_s .ref_vy_m_s .ref_vz_m_s  its velocity
     <ugv>.executing                           number of the proposal executed from this sample on, -1 without one
+    <robot>.seen_x_m .seen_y_m .seen_z_m      only with `sensing`: its measured position, which robots act on
+    <ugv>.uav_saw_x_m .uav_saw_y_m .uav_saw_z_m  only with `sensing`: where the UAV saw it, to plan with
     <ugv>.command_share                       only with unicycles: the share that was left of the law's command
     <robot>.drift_m_s .cover_m                only of users' plants, in the period that begins here: by how much
                                               the steered point missed its command, per time; and how far the body was
@@ -293,11 +295,15 @@ class Trace:
         return self._vectors(self.sampled, ugv, "ref_v", "m_s")
 
     def as_seen(self, by: str, of: str) -> Array:
-        """Where a robot saw a robot at the control samples, (S, 3), m: its true place, unless `seen` says otherwise.
+        """Where a robot saw a body at the control samples, (S, 3), m.
+
+        That is the body's true place, unless `seen` says otherwise or robots act on measured positions.
 
         Raises:
             TraceError: if a row of `seen` is not at the time of a control sample.
         """
+        if self.scenario.sensing and of in self.robots:
+            return self._vectors(self.sampled, of, "seen_", "m")
         places = self.position(of)[self.sample_rows]
         mine = self.seen[(self.seen["by"] == by) & (self.seen["of"] == of)]
         if len(mine):

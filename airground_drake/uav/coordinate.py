@@ -297,9 +297,9 @@ def _waits(mate: Teammate, t: float) -> bool:
 
 
 def _is_willing(mate: Teammate, t: float) -> bool:
-    """Whether a UGV may get a proposal at time t, s."""
+    """Whether a UGV may get a proposal of this UAV at time t, s."""
     just_asked = mate.proposal is not None and mate.proposal.issued == t
-    return not (mate.resting or just_asked)
+    return mate.in_charge and not (mate.resting or just_asked)
 
 
 def _cost(seen: Observation, group: Sequence[int], joint_plan: Plan) -> tuple[float, ...]:

@@ -154,7 +154,10 @@ class BehaviourDatabase:
                 mate = None if robot == seen.robot else next(member for member in seen.team if member.name == robot)
                 before = held if mate is None else Negotiation(refusals=mate.refusals, too_fast=mate.too_fast)
                 cause = robot if mate is None or mate.triggered else seen.robot
-                proposal = Proposal(chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, party=party)
+                beside = tuple(part for part in motions.items() if party and part[0] != robot)
+                proposal = Proposal(
+                    chosen.policy, seen.t, motion, cause=cause, mapped=seen.obstacles, party=party, beside=beside
+                )
                 held_by[robot] = replace(before, proposal=proposal, turn=turn, in_vain=0, cause=cause)
         return held_by, asked
 

@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
-from airground_drake.model.geometry.paths import NoPath, Path, shortest_path
+from airground_drake.model.geometry.paths import NoPath, Path, PathsFrom
 from airground_drake.uav.policy import Observation, Policy, Teammate
 
 SAMPLE_S = 0.05  # spacing of the vertices of the motion, s
@@ -52,8 +52,7 @@ class Detour(Policy):
         None if no free path leads to the preset trajectory before its end.
         """
         height = seen.position[2]
-        rows, reach = self._in_the_way(seen)
-        met = self._rendezvous(seen, rows, reach)
+        met = self._rendezvous(seen, PathsFrom(seen.position[:2], *self._in_the_way(seen)))
         if met is None:
             return None
         duration, path = met
@@ -63,7 +62,7 @@ class Detour(Policy):
         times = seen.start + np.linspace(0.0, max(duration, RENDEZVOUS_TOLERANCE_S), count + 1)
         return _then_follow(times, legs, seen.preset, self.follow, height)
 
-    def _rendezvous(self, seen: Observation, rows: Array, reach: Array) -> tuple[float, Path] | None:
+    def _rendezvous(self, seen: Observation, paths: PathsFrom) -> tuple[float, Path] | None:
         """Time to a rendezvous, s, and the path to it; None if the preset is blocked up to its end."""
         # The tried duration only grows: by a sample where the preset is blocked, otherwise to the travel time. So the
         # search finds every rendezvous that lasts longer than a sample. If the preset moves away nearly as fast as the
@@ -72,7 +71,7 @@ class Detour(Policy):
         duration = float(gap) / (self.speed + seen.preset.max_speed)  # no rendezvous can be earlier
         missed, strides = duration, 0
         while True:
-            needed, path = self._way(seen, duration, rows, reach)
+            needed, path = self._way(seen, duration, paths)
             if path is not None and needed <= duration + RENDEZVOUS_TOLERANCE_S:
                 break
             missed = duration
@@ -86,18 +85,18 @@ class Detour(Policy):
                 strides += 1
         while strides > CHASED and duration - missed > RENDEZVOUS_TOLERANCE_S:
             middle = 0.5 * (missed + duration)
-            needed, between = self._way(seen, middle, rows, reach)
+            needed, between = self._way(seen, middle, paths)
             if between is not None and needed <= middle + RENDEZVOUS_TOLERANCE_S:
                 duration, path = middle, between
             else:
                 missed = middle
         return duration, path
 
-    def _way(self, seen: Observation, duration: float, rows: Array, reach: Array) -> tuple[float, Path | None]:
+    def _way(self, seen: Observation, duration: float, paths: PathsFrom) -> tuple[float, Path | None]:
         """Travel time, s, and path to the preset's place after the duration, s; infinite and None without a path."""
         goal = seen.preset.at(seen.start + duration)[0][:2]
         try:
-            path = shortest_path(seen.position[:2], goal, rows, reach)
+            path = paths.to(goal)
         except NoPath:
             return math.inf, None
         return path.length_m / self.speed, path

@@ -4,7 +4,7 @@ An answer is two numbers per UGV: ACCEPT, REFUSE, DONE or SILENT, and the number
 means that the UGV has executed the motion to its end. The UAV ignores an answer unless it names the proposal in force.
 The report lists the obstacles that the UGV sensed when it decided, and the reason for its answer.
 
-A joint plan takes effect only while all its parts in force are accepted: see `accepted_proposals`.
+Each part of a joint plan is executed as soon as its own UGV accepts it. A refusal makes the UAV withdraw the others.
 """
 
 from __future__ import annotations
@@ -19,8 +19,6 @@ from airground_drake.uav.policy import Proposal
 
 ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0
 NOTHING = -1.0  # number of the proposal that a UGV executes if it executes none
-# Reason of a UGV that would accept its part of a joint plan, and refuses it because another UGV refuses its own.
-JOINT_REFUSED: Literal["joint_refused"] = "joint_refused"
 # Reason of a UGV that would come to rest short of its goal with the proposal, no nearer than without.
 STALLS: Literal["stalls"] = "stalls"
 
@@ -47,6 +45,15 @@ class Report(NamedTuple):
     seen: tuple[Sighting, ...] = ()  # obstacles that move and that the UGV sensed when it decided
 
 
+class Told(NamedTuple):
+    """What a UGV's answer says over a channel."""
+
+    verdict: float = SILENT  # on the proposal that it is about
+    report: Report = Report()
+    newest: int = -1  # the highest number of a proposal that the UGV has read of
+    holds: int = -1  # number of the proposal in force; -1: none
+
+
 Reports = tuple[Report, ...]  # one entry per UGV
 
 Proposals = tuple[Proposal | None, ...]  # one entry per UGV
@@ -70,12 +77,5 @@ def answer_to(proposal: Proposal | None, answers: Sequence[float] | Array, robot
 
 
 def accepted_proposals(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
-    """The proposals that UGVs execute, one entry per UGV: the proposal in force if it has taken effect, else None."""
-    # A proposal takes effect when its UGV accepts it. A part of a joint plan takes effect when, besides, every other
-    # part in force is accepted or done.
-    said = [answer_to(proposal, answers, i) for i, proposal in enumerate(proposals)]
-    stopped = {p.joint for p, answer in zip(proposals, said, strict=True) if p and answer not in (ACCEPT, DONE)}
-    return [
-        p if p is not None and answer == ACCEPT and (not p.party or p.joint not in stopped) else None
-        for p, answer in zip(proposals, said, strict=True)
-    ]
+    """The proposals that UGVs execute, one entry per UGV: the proposal in force if the UGV accepts it, else None."""
+    return [p if answer_to(p, answers, i) == ACCEPT else None for i, p in enumerate(proposals)]

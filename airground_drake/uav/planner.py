@@ -23,7 +23,6 @@ from airground_drake.uav.database import Asked, BehaviourDatabase, Negotiation
 from airground_drake.uav.messages import (
     ACCEPT,
     DONE,
-    JOINT_REFUSED,
     REFUSE,
     SILENT,
     STALLS,
@@ -134,6 +133,9 @@ class Planner:
     # Per UGV, whether its plant may fall behind a motion within its speed limit; default: none does.
     trails: tuple[bool, ...] = ()
     sender: Sender = ONLY  # the UAV
+    lead: float = 0.0  # time that a proposal is under way, s
+    charge: tuple[bool, ...] = ()  # per UGV, whether the UAV is in charge of it; default: of all
+    lost_at: float = np.inf  # from this time on the UAV neither sends nor hears anything, s
 
     @property
     def radii(self) -> Array:
@@ -160,7 +162,7 @@ class Planner:
         """Until when planning changes nothing, s, while the same UGVs are triggered; -inf: it may do so at once."""
         # Without a proposal in force no answer is read. Then a negotiation changes only when its rest is over, or when
         # neither its UGV nor its cause is triggered any more.
-        called = {name for name, triggered in zip(self.ugvs, intervening, strict=True) if triggered}
+        called = {name for name, own in zip(self.ugvs, self._own(intervening), strict=True) if own}
         until = math.inf
         for name, talk in zip(self.ugvs, memory.talks, strict=True):
             if talk.proposal is not None or (talk != Negotiation() and called.isdisjoint((name, talk.cause))):
@@ -168,6 +170,16 @@ class Planner:
             if name in called:
                 until = min(until, talk.retry_at)
         return until
+
+    def _own(self, intervening: Sequence[bool]) -> list[bool]:
+        """Which UGVs the UAV is to intervene on: those that are triggered and in its charge."""
+        return [a and b for a, b in zip(intervening, self.charge or (True,) * len(self.ugvs), strict=True)]
+
+    def lost(self, memory: PlannerState, t: float) -> PlannerState:
+        """The memory at time t, s, when the UAV is lost: no UGV holds a proposal any more whose motion is over."""
+        over = [talk.proposal is not None and t >= talk.proposal.motion.end for talk in memory.talks]
+        talks = [Negotiation() if gone else talk for gone, talk in zip(over, memory.talks, strict=True)]
+        return replace(memory, talks=tuple(talks)) if any(over) else memory
 
     def plan(
         self,
@@ -179,9 +191,11 @@ class Planner:
         reports: Reports,
         standing: Sequence[bool] = (),
         sightings: Sequence[Sighting] = (),
+        others: Proposals = (),
     ) -> PlannerState:
         """The memory after one planning period; `t` in s; `positions` of r robots (r, 3), m; `answers` (2n,)."""
         # standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
+        # others: per UGV, what any UAV asks of it; default: there is one UAV.
         said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
         unknown = {row for report in heard for row in report.sensed} - set(memory.learnt)
@@ -201,9 +215,9 @@ class Planner:
             read=(*memory.read, *((report.number, t) for report in heard if report.number > newest)),
             seen=tuple(latest.values()),
         )
-        if not any(called and talk.is_due(t) for called, talk in zip(intervening, talks, strict=True)):
+        if not any(called and talk.is_due(t) for called, talk in zip(self._own(intervening), talks, strict=True)):
             return memory
-        return self._asked(memory, t, positions, intervening, answers, standing, sightings)
+        return self._asked(memory, t, positions, intervening, answers, standing, sightings, others)
 
     def _asked(
         self,
@@ -214,6 +228,7 @@ class Planner:
         answers: Array,
         standing: Sequence[bool],
         sightings: Sequence[Sighting],
+        others: Proposals,
     ) -> PlannerState:
         """The memory after the policies were asked for all triggered UGVs that need a proposal."""
         mapped = self.mapped[self._there(t)]
@@ -221,12 +236,13 @@ class Planner:
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen}
         moving = self._moving(t, {sighting.name: sighting for sighting in sightings}, latest)
         talks, asked, memories = list(memory.talks), list(memory.asked), dict(enumerate(memory.memories))
+        own = self._own(intervening)
         for i, robot in enumerate(self.ugvs):
-            if not (intervening[i] and talks[i].is_due(t)):
+            if not (own[i] and talks[i].is_due(t)):
                 continue
             seen = Observation(
                 t=t,
-                start=t + self.period,
+                start=t + self.period + self.lead,
                 robot=robot,
                 position=positions[i],
                 target=self.targets[i],
@@ -235,7 +251,7 @@ class Planner:
                 mapped=mapped,
                 others=np.delete(positions, i, axis=0),
                 refusals=talks[i].refusals,
-                team=self._team(t, positions, intervening, answers, talks, standing),
+                team=self._team(t, positions, intervening, answers, talks, standing, others),
                 robot_distance=self.robot_distance,
                 radius=float(self.radii[i]),
                 moving=moving,
@@ -279,20 +295,18 @@ class Planner:
         """Negotiations after the UGVs' answers."""
         # A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
         # its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
-        # trajectory goes on: the others' ways were planned with it. A UGV that refuses only because another one does is
-        # asked again at once. If a UGV that may fall behind would have stalled, or was left behind, its motion was too
-        # fast.
+        # trajectory goes on: the others' ways were planned with it. Those that did not refuse are asked again at once.
+        # If a UGV that may fall behind would have stalled, or was left behind, its motion was too fast.
         called = {name for name, active in zip(self.ugvs, intervening, strict=True) if active}
-        own = [a == REFUSE and report.reason != JOINT_REFUSED for a, report in zip(said, reports, strict=True)]
-        refused = {talk.proposal.joint for talk, no in zip(talks, own, strict=True) if talk.proposal and no}
+        refused = {talk.proposal.joint for talk, a in zip(talks, said, strict=True) if talk.proposal and a == REFUSE}
         after = []
-        for i, (name, talk, answer, refuses) in enumerate(zip(self.ugvs, talks, said, own, strict=True)):
+        for i, (name, talk, answer) in enumerate(zip(self.ugvs, talks, said, strict=True)):
             proposal, trails = talk.proposal, bool(self.trails and self.trails[i])
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
             party = proposal.party if proposal else ()
             if called.isdisjoint((name, talk.cause, *party)):
                 talk = Negotiation()
-            elif refuses or (answer == REFUSE and not party_refused):
+            elif answer == REFUSE:
                 talk = self.database.after_refusal(
                     talk, t, learnt=learnt, too_fast=trails and reports[i].reason == STALLS
                 )
@@ -311,8 +325,11 @@ class Planner:
         answers: Array,
         talks: Sequence[Negotiation],
         standing: Sequence[bool],
+        others: Proposals,
     ) -> tuple[Teammate, ...]:
         """All UGVs as the UAV sees them at time t, s."""
+        charge = self.charge or (True,) * len(self.ugvs)
+        asked = [talk.proposal if charge[i] else others[i] for i, talk in enumerate(talks)]
         return tuple(
             Teammate(
                 name=name,
@@ -322,12 +339,13 @@ class Planner:
                 max_speed=float(self.max_speed[i]),
                 triggered=bool(intervening[i]),
                 standing=standing[i] if standing else False,
-                proposal=talks[i].proposal,
-                answered=_WORDS.get(answer_to(talks[i].proposal, answers, i), "silent"),
+                proposal=asked[i],
+                answered=_WORDS.get(answer_to(asked[i], answers, i), "silent"),
                 refusals=talks[i].refusals,
                 too_fast=talks[i].too_fast,
                 resting=talks[i].refused_lately(t),
                 radius=float(self.radii[i]),
+                in_charge=charge[i],
             )
             for i, name in enumerate(self.ugvs)
         )

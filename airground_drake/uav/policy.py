@@ -38,6 +38,7 @@ class Teammate:
             on the way and refused them, or was left behind by them.
         resting: whether it gets no proposal now because it has refused one recently.
         radius: of its body, m.
+        in_charge: whether the UAV that plans is in charge of it; if not, `proposal` is that of another UAV.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Teammate:
     too_fast: int = 0
     resting: bool = False
     radius: float = 0.0
+    in_charge: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +145,7 @@ class Proposal:
         cause: name of the UGV whose trigger led to the proposal. If it names another UGV, this one is asked to make
             way for it. Empty: this UGV.
         party: names of all UGVs in the same joint plan; empty: the proposal stands alone.
+        beside: what the same joint plan asks of the others, by name, so that a UGV needs no other message to judge it.
         number: identifies the proposal in the UGV's answer. `planner.sent_after` gives it; before that it is -1.
         sender: name of the UAV that sends it, as `planner.sent_after` gives it.
     """
@@ -154,6 +157,7 @@ class Proposal:
     mapped: Array = field(default_factory=lambda: outline.stacked([]))
     cause: str = ""
     party: tuple[str, ...] = ()
+    beside: tuple[tuple[str, Motion], ...] = ()
     number: int = -1
     sender: str = ""
 
@@ -200,9 +204,9 @@ class Policy(abc.ABC):
     def propose(self, seen: Observation) -> Motion | Mapping[str, Motion] | None:
         """Propose a motion from `seen.start` on, motions for several UGVs, or None for no intervention.
 
-        A Motion is for the UGV `seen.robot`. Motions by name are a joint plan for UGVs of the team. UGVs in it that
-        are triggered get proposals of their own; the others are asked to make way for `seen.robot`. A UGV that has got
-        a proposal at this instant (`issued == seen.t`) cannot be in the plan.
+        A Motion is for the UGV `seen.robot`. Motions by name are a joint plan for UGVs in the UAV's charge. UGVs in it
+        that are triggered get proposals of their own; the others are asked to make way for `seen.robot`. A UGV that has
+        got a proposal at this instant (`issued == seen.t`) cannot be in the plan.
         """
 
 
@@ -211,21 +215,21 @@ def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
 
     Raises:
         TypeError: if it is neither a motion nor motions by name.
-        ValueError: if a name is not a UGV of the team, a UGV has got a proposal at this instant, vertices are less than
-            `SHORTEST_LEG_S` apart, or a number exceeds `LARGEST`.
+        ValueError: if a name is not a UGV in the UAV's charge, a UGV has got a proposal at this instant, vertices are
+            less than `SHORTEST_LEG_S` apart, or a number exceeds `LARGEST`.
     """
     if proposed is None:
         return {}
     if not isinstance(proposed, Mapping):
         proposed = {seen.robot: proposed}
-    known = {seen.robot, *(mate.name for mate in seen.team)}
+    known = {seen.robot, *(mate.name for mate in seen.team if mate.in_charge)}
     taken = {mate.name for mate in seen.team if mate.proposal is not None and mate.proposal.issued == seen.t}
     motions = {}
     for name, motion in list(proposed.items()):
         if not isinstance(motion, Motion):
             raise TypeError(f"a policy proposes a Motion, Motions by UGV or None, not {type(motion).__name__}")
         if not isinstance(name, str) or name not in known:
-            raise ValueError(f"a policy proposes to UGVs of the team, not to {name!r}")
+            raise ValueError(f"a policy proposes to UGVs in the UAV's charge, not to {name!r}")
         if name in taken:
             raise ValueError(f"{name} has a proposal of this instant already")
         plain = Motion(motion.times, motion.positions)

@@ -44,8 +44,6 @@ class Basis(NamedTuple):
     known: tuple[int, ...] = ()  # under method (d), obstacles sensed so far and not seen to be gone
     new: tuple[int, ...] = ()  # of these, those sensed for the first time that are not on the proposal's map
     told: tuple[int, ...] = ()  # rows of the proposal's map that the UGV believed
-    # under method (d), the proposals that other UGVs had and had not refused: number, and whether accepted
-    asked: tuple[tuple[int, bool], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from airground_drake.uav.messages import (
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import Basis, GatekeeperDecision, Rules, in_words, settle
 from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.desk import Desk
 from airground_drake.ugv.patience import Commitment
 from airground_drake.ugv.problem import Horizon, Problem, predicted_problem
 from airground_drake.ugv.rollout import View
@@ -46,6 +47,7 @@ class GatekeeperState:
     since: tuple[float, ...]  # when each UGV's answer became what it is, (n,), s
     reports: Reports  # what each UGV last told the UAV about its proposal
     told: int = 0  # answers sent so far
+    desk: Desk | None = None  # what was read and answered over a channel
     decisions: tuple[GatekeeperDecision, ...] = ()  # those of the last sample that was not idle
     commitments: tuple[Commitment, ...] = ()  # under method (d), each UGV's tries and rests
     # under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m)
@@ -54,10 +56,11 @@ class GatekeeperState:
     made: tuple[GatekeeperDecision, ...] = ()
 
     @classmethod
-    def empty(cls, count: int) -> GatekeeperState:
+    def empty(cls, count: int, *, channel: bool = False) -> GatekeeperState:
         """Of `count` UGVs that have answered nothing yet."""
         held = (Commitment(),) * count
-        return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held)
+        desk = Desk.empty(count) if channel else None
+        return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held, desk=desk)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""

@@ -97,9 +97,8 @@ def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tupl
 def robot_at(seen: View, robot: int, after: Array, coasting: float, *, together: bool) -> Array:
     """Where one of the other bodies is predicted to be at times `after` from now, (S + 1,) s: (S + 1, 3), m."""
     # A robot that is asked to make a motion tracks it: its distance from the motion decays with a time constant of 1 s.
-    # Any other robot keeps its velocity for `coasting`, s, then stands. A motion that it has not accepted yet counts
-    # only where this UGV accepts, too (`together`): otherwise each would refuse its part of a joint plan because the
-    # other parts free its way.
+    # Any other robot keeps its velocity for `coasting`, s, then stands. The other parts of a joint plan count only if
+    # this UGV accepts its own (`together`): otherwise each would refuse because the other parts free its way.
     place, asked = seen.places[robot], seen.asked[robot]
     if asked is None or not (together or asked[1]):
         return place + np.minimum(after, coasting)[:, None] * seen.velocities[robot]

@@ -6,8 +6,7 @@ withdrawn, its motion is over, or it has been executed for as long as it may be.
 or the other choice looks cheaper. There is one exception: when the UGV senses an obstacle that it did not know at the
 acceptance, it compares both outcomes again. That is no new try: `patience` bounds how often a UGV goes along.
 
-If a UGV refuses its part of a joint plan, those that judge their parts at the same sample refuse them, too. So a plan
-that nobody executes costs nobody a try.
+Each UGV judges its own part of a joint plan, and executes it when it accepts.
 
 Safety does not rest on this: an accepted motion is executed below the avoidance inequalities.
 """
@@ -31,7 +30,6 @@ from airground_drake.model.plants.scripted import Scripted
 from airground_drake.uav.messages import (
     ACCEPT,
     DONE,
-    JOINT_REFUSED,
     REFUSE,
     SILENT,
     Proposals,
@@ -81,7 +79,7 @@ class OutcomeGatekeepers(Gatekeepers):
             if proposal is not None
         ]
         verdicts: list[tuple[GatekeeperDecision, float]] = []
-        for decision in _jointly(judged, said):
+        for decision in judged:
             i = decision.robot
             held[i] = self._after(held[i], decision, said[i])
             verdicts.append((replace(decision, tries=held[i].tries), _answer(decision, said[i])))
@@ -155,27 +153,20 @@ class OutcomeGatekeepers(Gatekeepers):
         return outcomes(seen, law, proposal, self._outlook)
 
     def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> tuple[View, Basis]:
-        """A UGV's knowledge: obstacles sensed or told of, other bodies that move and the motions asked of them."""
+        """A UGV's knowledge: obstacles sensed or told of, bodies that move, and what the same plan asks of others."""
         around, m = self._view(now, i), len(self._near.still)
         told = self._believed(now.positions[i], known.sensed[i], proposal)
         still = outline.joined(self._near.still[known.sensed[i]], proposal.mapped[told])
         asked: list[tuple[Motion, bool] | None] = []
-        numbers = list[tuple[int, bool]]()
-        for j in self._near.carrier[self._beside(now, i)].tolist():
-            plant = self._world.moving[j].plant
-            if isinstance(plant, Scripted):
-                asked.append((plant.script, True) if plant.announced else None)
-                continue
-            other = now.proposals[j] if j < len(now.proposals) else None
-            answer = answer_to(other, known.answers, j)
-            if other and answer in (ACCEPT, SILENT):
-                numbers.append((other.number, answer == ACCEPT))
-                asked.append((other.motion, answer == ACCEPT))
+        planned = dict(proposal.beside)
+        for body in (self._world.moving[j] for j in self._near.carrier[self._beside(now, i)]):
+            if isinstance(body.plant, Scripted):
+                asked.append((body.plant.script, True) if body.plant.announced else None)
             else:
-                asked.append(None)
+                asked.append((planned[body.name], False) if body.name in planned else None)
         sensed = np.flatnonzero(self._in_range(now.t, now.positions[i])).tolist()
         remembered = np.flatnonzero(known.sensed[i]).tolist()
-        basis = Basis(tuple(sensed), tuple(remembered), (), tuple(told.tolist()), tuple(numbers))
+        basis = Basis(tuple(sensed), tuple(remembered), (), tuple(told.tolist()))
         seen = replace(
             around,
             still=still,
@@ -197,17 +188,6 @@ class OutcomeGatekeepers(Gatekeepers):
         new = np.flatnonzero((apart > self.law.avoidance.sensing_range) & ~known)
         nearest = np.argsort(apart[new], kind="stable")[:MOST_CLAIMED]
         return new[np.sort(nearest)]
-
-
-def _jointly(judged: Sequence[GatekeeperDecision], said: Sequence[float]) -> list[GatekeeperDecision]:
-    """The decisions of a sample. Where a part of a joint plan is refused, no other part of it is newly accepted."""
-    refused = {decision.proposal.joint for decision in judged if _answer(decision, said[decision.robot]) == REFUSE}
-
-    def is_refused(decision: GatekeeperDecision) -> bool:
-        proposal, new = decision.proposal, said[decision.robot] == SILENT
-        return decision.accepted and new and bool(proposal.party) and proposal.joint in refused
-
-    return [replace(d, accepted=False, reason=JOINT_REFUSED) if is_refused(d) else d for d in judged]
 
 
 def _answer(decision: GatekeeperDecision, standing: float) -> float:

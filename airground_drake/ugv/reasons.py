@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 Reason = Literal[
     "cheaper", "not_cheaper", "waits", "no_difference", "kept", "dwell", "reversed", "no_plan",
     "first_stage",
-    "stalls", "makes_way", "exhausted", "over", "joint_refused",
+    "stalls", "makes_way", "exhausted", "over",
 ]  # fmt: skip
 OVER: Reason = "over"  # no refusal: the proposal was executed for as long as it was accepted
 
@@ -39,7 +39,6 @@ WORDS: dict[Reason, Words] = {
     ),
     "makes_way": Words("the UGV makes way for another one and still reaches its goal"),
     "exhausted": Words("the UGV has used all of its tries and has not rested since", "it had used all of its tries"),
-    "joint_refused": Words("another UGV refuses its part of the joint plan", "another UGV refused its part"),
     "over": Words("the time for which the proposal was accepted is over"),
 }
 

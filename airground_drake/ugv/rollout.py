@@ -34,8 +34,8 @@ class View:
     distances: Array  # safe distances from the cores, (m + n,), m
     shares: Array  # share of each avoidance inequality, (m + n,)
     max_speed: float  # own speed limit, m/s
-    # under method (d), per part that moves, the motion that its body is asked to make and whether it has accepted it,
-    # or None
+    # under method (d), per part that moves, the motion that its body is asked to make, and whether it makes it whatever
+    # this UGV answers; or None
     asked: tuple[tuple[Motion, bool] | None, ...] = ()
     heading: float = 0.0  # own heading, rad, of a unicycle
     # numbers of its steering, (6,), see `model.plants.steering`; zeros for a robot that is no unicycle

@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 from airground_drake.base.exact import decimal
 from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
-from airground_drake.scenario.plants import plant_of
+from airground_drake.scenario.plants import bounds_of, plant_of
 from airground_drake.scenario.schema import Control, Scenario, Uav, Ugv
 
 # By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none.
-SHARES = {"obstacle": (Fraction(1), Fraction(0)), "uav_ugv": (Fraction(1, 2),) * 2, "ugv_ugv": (Fraction(1, 2),) * 2}
-KINDS = {"air_ground": "uav_ugv", "ugv": "ugv_ugv"}  # by `Scenario.pair_of`, of two robots
+KINDS = {"air_ground": "uav_ugv", "ugv": "ugv_ugv", "uav": "uav_uav"}  # by `Scenario.pair_of`, of two robots
+SHARES = {"obstacle": (Fraction(1), Fraction(0)), **dict.fromkeys(KINDS.values(), (Fraction(1, 2),) * 2)}
 MOVING = "moving"  # the kind of a robot beside an obstacle that may move: no theorem keeps its distance
 # The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points.
 STEERED = "steered"
@@ -94,7 +94,8 @@ def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
 def _kinds(scenario: Scenario) -> Iterator[PairKind]:
     """The extreme pairs of each kind in `SHARES`: the hypotheses hold for all pairs if they hold for these."""
     # Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
-    robots = {name: _Robot.of(robot, scenario.control) for name, robot in scenario.robots.items()}
+    about = scenario.control, scenario.position_error_m
+    robots = {name: _Robot.of(robot, *about) for name, robot in scenario.robots.items()}
     asked = {(pair.kind, robots[pair.first], robots.get(pair.second), *pair[3:]) for pair in apart(scenario)}
     pairs: dict[str, set[tuple[Fraction, Fraction]]] = {kind: set() for kind in SHARES}
     for kind, own, other, required, (_, radius) in asked:
@@ -120,8 +121,8 @@ class _Robot(NamedTuple):
     gain_1_s: float
 
     @classmethod
-    def of(cls, robot: Ugv | Uav, control: Control) -> _Robot:
-        bounds = plant_of(robot, control.period_s).bounds(robot.max_speed_m_s)
+    def of(cls, robot: Ugv | Uav, control: Control, error_m: float) -> _Robot:
+        bounds = bounds_of(robot, control.period_s, error_m)
         return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), bounds, control.avoidance_gain_1_s)
 
     def beside(self, other: _Robot | None, safe_m: Fraction) -> tuple[Fraction, Fraction]:

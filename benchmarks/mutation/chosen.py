@@ -338,6 +338,30 @@ GATEKEEPER = (
 RULES = "tests/check/test_forgeries.py::test_each_rule_of_the_checker_refuses_what_it_is_for"
 JUDGES = (
     Mutant(
+        "array judges pass over too much of a way",
+        "model/geometry/encounter.py",
+        "least_apart",
+        "gone[following + 1] - gone[k] < here - best",
+        "gone[following + 1] - gone[k] < here",
+        tests=("tests/model/geometry/test_encounter.py",),
+    ),
+    Mutant(
+        "array judges pass a late trigger",
+        "verify/array_judges.py",
+        "ArrayJudges._thr_trig",
+        "lag > EVENT_TOLERANCE_S / 2.0",
+        "lag > 1.0",
+        tests=("tests/verify/test_array_judges.py",),
+    ),
+    Mutant(
+        "array judges do not look where commands lead to",
+        "verify/array_judges.py",
+        "ArrayJudges._is_a_run",
+        "np.abs(off).max() <= MOTION_TOLERANCE_M",
+        "np.abs(off).max() < np.inf",
+        tests=("tests/verify/test_array_judges.py",),
+    ),
+    Mutant(
         "SAFE-TRACE allows 5 cm",
         "verify/claims/safe_trace.py",
         "SafeTrace.check",

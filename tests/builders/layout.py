@@ -108,8 +108,8 @@ def message_table(events: Sequence[dict[str, Any]], decisions: Sequence[dict[str
     sent += [("answer", d["answer"], d["robot"], uav, d.get("number", 0), d["t_s"]) for d in decisions]
     names = ("kind", "number", "sender", "receiver", "about", "sent_s")
     rows = [dict(zip(names, each, strict=True)) for each in sent]
-    return typed([row | {"copy": 0, "received_s": row["sent_s"], "read_s": row["sent_s"]} for row in rows],
-                 MESSAGE_COLUMNS)  # fmt: skip
+    at_once = ({"attempt": 0, "copy": 0, "received_s": row["sent_s"], "read_s": row["sent_s"]} for row in rows)
+    return typed([row | more for row, more in zip(rows, at_once, strict=True)], MESSAGE_COLUMNS)
 
 
 def _proposed(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

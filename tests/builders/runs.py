@@ -64,5 +64,5 @@ def beside_a_rock(step: float = 0.0, start: float = -2.0) -> Trace:
 
 @cache
 def dead_end() -> Trace:
-    """Under (d), ugv1 would accept its part of a joint plan, but the other three refuse theirs; later all accept."""
+    """Under (d), ugv1 would accept its part of a joint plan, but others refuse theirs."""
     return simulation.simulate(planner.scenario_of("deadend4", planner.dead_end(4), 3.0), "d")

@@ -56,6 +56,13 @@ def test_a_run_that_obeyed_the_law_is_promised_its_distances(run: Run, judged: C
         assert (found["status"], found["covered"]["all"]) == ("kept", True)
 
 
+def test_distances_between_uavs_are_judged(run: Run, judged: Callable[..., dict[str, Any]]) -> None:
+    found = judged(sampled(run("two_uavs", "d")), "two_uavs")
+    (pair,) = [pair for pair in found["pairs"] if (pair["first"], pair["second"]) == ("north", "south")]
+    assert pair["status"] == found["status"] == "kept"
+    assert pair["missed_m"] <= 1e-12
+
+
 def test_a_run_that_hits_an_obstacle_is_exit_code_1(run: Run, judged: Callable[..., dict[str, Any]]) -> None:
     worst = judged(sampled(run("case_b", "b")), "case_b", code=1)["pairs"][0]
     assert (worst["first"], worst["second"], worst["status"]) == ("ugv1", "sudden", "NOT KEPT")

@@ -7,6 +7,7 @@ have one. So they are tests, and run on shipped and on drawn scenarios.
 from collections.abc import Callable
 
 from airground_drake.sim.trace import Trace
+from oracles.channel import wrong_carriage
 from oracles.commands import wrong_commands
 from oracles.communication import wrong_messages
 from oracles.decisions import wrong_decisions
@@ -22,6 +23,7 @@ ORACLES: dict[str, Callable[[Trace], list[Fault]]] = {
     "progress": wrong_answers,
     "communication": wrong_messages,
     "protocol": wrong_executions,
+    "channel": wrong_carriage,
     "inputs": wrong_inputs,
     "decisions": wrong_decisions,
 }

@@ -18,6 +18,7 @@ from airground_drake.verify.runs.pairs import Pair, cores_of, pairs_beside, pair
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected
+from oracles.protocol import parts_of
 from oracles.sensing import moves, still_parts
 from oracles.turning import numbers_of
 
@@ -49,10 +50,9 @@ def beginning(trace: Trace, t: float, number: int) -> Beginning:
     """
     table = trace.decisions
     (row,) = table[(table["t_s"] == t) & (table["number"] == number)].to_dict("records")
-    asked = {(one := proposal_of(trace, int(k))).ugv: (one, bool(said)) for k, said in zip(
-        row["asked"], row["asked_accepted"], strict=True)}  # fmt: skip
     gate, h = trace.scenario.gatekeeper, trace.scenario.control.period_s
     on = proposal_of(trace, number)
+    asked = {part.ugv: part for part in parts_of(trace, on)}
     robot = on.ugv
     corners, speed = preset_of(trace, robot)
     arrives = float(corner_times(corners, speed)[-1]) if len(corners) > 1 else 0.0
@@ -179,18 +179,18 @@ def known_cores(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[
 
 
 def _other(
-    trace: Trace, robot: str, t: float, after: Array, pair: Pair, told: Mapping[str, tuple[ProposalRecord, bool]]
+    trace: Trace, robot: str, t: float, after: Array, pair: Pair, told: Mapping[str, ProposalRecord]
 ) -> tuple[tuple[Array, Array], float, float, float]:
     """Where another robot is predicted to be, (S + 1, 3), m; its safe distance, its share, when its motion is over.
 
-    The places come twice: if the proposal is refused, and if it is accepted. A motion that the other robot has not
-    accepted yet counts in the second only.
+    The places come twice: if the proposal is refused, and if it is accepted. The other part of its joint plan counts in
+    the second only.
     """
     other = pair.second if pair.first == robot else pair.first
     here, velocity = moves(trace, other, t)
     coasting = here + np.minimum(after, trace.scenario.gatekeeper.horizon_s)[:, None] * velocity
-    asked, accepted = told.get(other, (None, False))
+    asked = told.get(other)
     if asked is None:
         return (coasting, coasting), pair.law_m, pair.share, -np.inf
     goes = place(asked, t + after) + np.exp(-after)[:, None] * (here - place(asked, t))
-    return (goes if accepted else coasting, goes), pair.law_m, pair.share, float(asked.times_s[-1])
+    return (coasting, goes), pair.law_m, pair.share, float(asked.times_s[-1])

@@ -47,8 +47,9 @@ def wrong_commands(trace: Trace) -> list[Fault]:
     """For each robot the first control sample at which its command is not the law's."""
     samples = trace.sample_rows
     laws = {ugv: _law_of_ugv(trace, ugv, samples) for ugv in trace.ugvs}
-    if trace.scenario.uav.task == "formation":  # another task is third-party code
-        laws[trace.scenario.uav.name] = _law_of_uav(trace, samples)
+    for name, uav in trace.scenario.aerial.items():
+        if uav.task == "formation":  # another task is third-party code
+            laws[name] = _law_of_uav(trace, name, samples)
     found = []
     for robot, law in laws.items():
         wrong = np.flatnonzero(~(law.away <= COMMAND_TOLERANCE_M_S))
@@ -102,15 +103,15 @@ def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
     return [slopes[np.searchsorted(times, t + shift)] for shift in (-TIME_TOLERANCE_S, TIME_TOLERANCE_S)]
 
 
-def _law_of_uav(trace: Trace, samples: Rows) -> Law:
-    """(9)-(11); it feeds the UGVs' commands of the sample before forward."""
-    uav, control = trace.scenario.uav, trace.scenario.control
-    position, recorded = trace.as_seen(uav.name, uav.name), trace.chosen(uav.name)
-    centroid = np.mean([trace.as_seen(uav.name, ugv) for ugv in trace.ugvs], axis=0)
-    fed = np.mean([trace.command(ugv)[samples] for ugv in trace.ugvs], axis=0)
+def _law_of_uav(trace: Trace, name: str, samples: Rows) -> Law:
+    """(9)-(11); it feeds the commands of its UGVs of the sample before forward."""
+    uav, ugvs, control = trace.scenario.aerial[name], trace.scenario.in_charge(name), trace.scenario.control
+    position, recorded = trace.as_seen(name, name), trace.chosen(name)
+    centroid = np.mean([trace.as_seen(name, ugv) for ugv in ugvs], axis=0)
+    fed = np.mean([trace.command(ugv)[samples] for ugv in ugvs], axis=0)
     fed[trace.t[samples] <= TIME_TOLERANCE_S] = 0.0  # nothing was commanded before the first sample
     over = centroid + np.array([0.0, 0.0, uav.altitude_m])
     below = limited(fed + control.formation_gain_1_s * (over - position), uav.max_speed_m_s)
-    given, limit = as_seen(trace, uav.name), uav.max_speed_m_s
+    given, limit = as_seen(trace, name), uav.max_speed_m_s
     command = avoiding(retreating(below, given, limit, planar=False), given, "augmented", planar=False)
     return Law(command, np.linalg.norm(recorded - command, axis=1))

@@ -12,8 +12,9 @@ from airground_drake.verify.runs.demands import outlines_of
 from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import carried
 from airground_drake.verify.runs.proposals import proposals_of
+from oracles.channel import has_channel
 from oracles.fault import Fault
-from oracles.protocol import answers_to, parties, withdrawn_s
+from oracles.protocol import answers_to, known_answers, lost_s, parties, withdrawn_s
 from oracles.sensing import are_same, are_there, beyond_range, still_parts
 
 SENSED_M = 1e-9
@@ -31,13 +32,17 @@ def _out_of_turn(trace: Trace) -> Iterator[Fault]:
     """Messages while nobody was being intervened on: the UGV, the UGV that it was to make way for, or another party.
 
     After a release the UAV withdraws its proposal at its next planning instant, and the gatekeeper notices at its next
-    sample: one period each is allowed.
+    sample: one period each is allowed. A UAV that is lost withdraws nothing: then decisions go on to the motion's end.
     """
     allowance = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
     for sent in proposals_of(trace):
         spans = np.concatenate([intervening(trace, ugv) for ugv in parties(trace, sent)])
         begins, ends = spans[:, 0] - TIME_TOLERANCE_S, spans[:, 1] + allowance + TIME_TOLERANCE_S
-        messages = [("proposal", sent.issued_s), *(("decision", answer.t_s) for answer in answers_to(trace, sent))]
+        if lost_s(trace, sent) <= sent.times_s[-1]:
+            ends = np.maximum(ends, sent.times_s[-1] + allowance)
+        messages = [("proposal", sent.issued_s)]
+        if not has_channel(trace):
+            messages += [("decision", answer.t_s) for answer in answers_to(trace, sent)]
         if wrong := [(kind, t) for kind, t in messages if not ((t >= begins) & (t <= ends)).any()]:
             yield Fault(f"{wrong[0][0]} while nobody needs it", sent.ugv, wrong[0][1])
 
@@ -76,9 +81,10 @@ def _wrong_maps(trace: Trace) -> Iterator[Fault]:
     told_before = np.array([scenario.barriers[parts.names[k]].known_to_uav for k in parts.owner], dtype=np.bool_)
     once = {every[k] for k in np.flatnonzero(told_before)}
     gap = scenario.safe_distance.obstacle_m
-    phantoms = [(gap, 0.0, 0.0, z, z, 1.0, x, y) for x, y, z in scenario.uav.phantoms_m]
-    surely, perhaps = _told(trace, every)
+    told = {uav: _told(trace, every, uav) for uav in scenario.aerial}
     for sent in proposals_of(trace):
+        surely, perhaps = told[sent.sender]
+        phantoms = [(gap, 0.0, 0.0, z, z, 1.0, x, y) for x, y, z in scenario.aerial[sent.sender].phantoms_m]
         listed, t = list(map(_without_circle, sent.mapped)), sent.issued_s
         there = told_before & are_there(trace, t)
         known = [*(every[k] for k in np.flatnonzero(there)), *phantoms]
@@ -91,17 +97,19 @@ def _wrong_maps(trace: Trace) -> Iterator[Fault]:
             yield Fault("map of a proposal", sent.ugv, t, {"learnt": learnt, "told": sorted(most)})
 
 
-def _told(trace: Trace, every: list[Part]) -> tuple[dict[Part, float], dict[Part, float]]:
-    """When the UAV surely knew each part of a barrier that came with an answer, and when it may have known it, s.
+def _told(trace: Trace, every: list[Part], uav: str) -> tuple[dict[Part, float], dict[Part, float]]:
+    """When a UAV surely knew each part of a barrier that came with an answer, and when it may have known it, s.
 
     At a planning instant the UAV reads the last answer before, if the proposal has been in force until then.
     """
     period, surely, perhaps = trace.scenario.intervention.period_s, dict[Part, float](), dict[Part, float]()
-    for sent in proposals_of(trace):
+    for sent in (sent for sent in proposals_of(trace) if sent.sender == uav):
         end = min(withdrawn_s(trace, sent), float(trace.t[-1])) + TIME_TOLERANCE_S
         read = dict[float, float]()  # by time of the last answer before a planning instant
         for k in range(round(sent.issued_s / period) + 1, int(end / period + 1e-6) + 1):
             before = [answer.t_s for answer in answers_to(trace, sent) if answer.t_s < k * period - TIME_TOLERANCE_S]
+            if has_channel(trace):
+                before = [answer.t_s for answer in known_answers(trace, sent, k * period)]
             if before:
                 read.setdefault(before[-1], k * period)
         for answer in answers_to(trace, sent):

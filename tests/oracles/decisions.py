@@ -27,8 +27,9 @@ from airground_drake.verify.runs.gate_record import (
 )
 from airground_drake.verify.runs.instants import GATED_METHODS, intervening
 from airground_drake.verify.runs.pairs import pairs_beside, preset_of
-from airground_drake.verify.runs.proposals import proposals_of
+from airground_drake.verify.runs.proposals import proposal_of, proposals_of
 from oracles.beginnings import movers
+from oracles.channel import has_channel, held
 from oracles.fault import Fault
 from oracles.sensing import sensed, still_parts
 
@@ -68,7 +69,10 @@ def compare_times(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Devi
     """The first decision is within a period of the proposal, the others a period apart; none that is due is missing."""
     period = trace.scenario.gatekeeper.period_s
     for row, last in in_turn(trace, rows):
-        early = row.given["issued_s"] if last is None else last.t_s + period
+        first = row.given["issued_s"]
+        if has_channel(trace):
+            first = held(trace, proposal_of(trace, row.number))[0]
+        early = first if last is None else last.t_s + period
         late = early + period if last is None else early
         yield Deviation(row, "a decision is missing before this one, s", max(0.0, row.t_s - late), TIME_TOLERANCE_S)
         yield Deviation(row, "a decision too many, s", max(0.0, early - row.t_s), TIME_TOLERANCE_S)
@@ -84,7 +88,7 @@ def compare_proposals(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[
     allowed = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
     decided = {row.given["number"] for row in rows}
     sent = proposals_of(trace)
-    for one in sent:
+    for one in [] if has_channel(trace) else sent:
         until = one.issued_s + allowed
         stays = np.concatenate([intervening(trace, ugv) for ugv in sorted({one.ugv, one.cause})])
         called = ((stays[:, 0] <= one.issued_s + TIME_TOLERANCE_S) & (stays[:, 1] > until)).any()

@@ -1,4 +1,4 @@
-"""What a decision rested on, as recorded: parts within range, known, new and told, and what others were asked."""
+"""What a decision rested on, as recorded: parts within range, known, new and told."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -22,9 +22,8 @@ from airground_drake.verify.engines.outlines import (
     away_from,
 )
 from airground_drake.verify.runs.acceptances import METHOD
-from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of, proposals_of
+from airground_drake.verify.runs.proposals import proposal_of
 from oracles.fault import Fault
-from oracles.protocol import answers_to
 from oracles.sensing import are_same, are_there, beyond_range, first_sensed, seen_gone, still_parts
 
 MOST_CLAIMED = 64
@@ -46,7 +45,7 @@ def wrong_inputs(trace: Trace) -> list[Fault]:
 def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any], list[Any]]]:
     """Each recorded input of a decision with what is due; where nothing was predicted, nothing is recorded."""
     t, ugv, period_s = float(row["t_s"]), str(row["robot"]), trace.scenario.gatekeeper.period_s
-    recorded = {name: [*row[name]] for name in ("sensed", "known", "new", "told", "asked", "asked_accepted")}
+    recorded = {name: [*row[name]] for name in ("sensed", "known", "new", "told")}
     if trace.meta["method"] == METHOD and row["accept_stalls"] < 0.0:
         yield from ((name, [], found) for name, found in recorded.items())
         return
@@ -66,9 +65,6 @@ def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any
     if stood:  # at the first decision on a proposal what is new makes no difference
         yield "new", np.flatnonzero(new).tolist(), recorded["new"]
     yield "told", _told(trace, ugv, t, on.mapped, cores.take(known)), recorded["told"]
-    others = [asked_of(trace, other, t) for other in trace.ugvs if other != ugv]
-    yield "asked", [one.number for one, _ in others if one], recorded["asked"]
-    yield "asked, accepted", [int(accepted) for one, accepted in others if one], recorded["asked_accepted"]
 
 
 def _told(trace: Trace, ugv: str, t: float, mapped: Array, known: Cores) -> list[int]:
@@ -89,16 +85,3 @@ def _is_outline(row: Array, corners: Array) -> bool:
     held = np.hypot(*(there - row[MIDDLE:EXTENT]).T).max() <= row[EXTENT]
     lengths = row[[GAP, RADIUS, SPEED]].min() >= 0.0 and row[BASE] <= row[TOP]
     return bool(held and lengths and (turned >= 0.0).all())
-
-
-def asked_of(trace: Trace, ugv: str, t: float) -> tuple[ProposalRecord | None, bool]:
-    """The proposal in force for a UGV at a sample of the gatekeeper, unless it has refused it by the sample before.
-
-    A proposal is in force if the UGV decides about it at that sample. Besides: whether it has accepted it by then.
-    """
-    for one in proposals_of(trace):
-        answers = answers_to(trace, one) if one.ugv == ugv else []
-        if any(abs(answer.t_s - t) <= TIME_TOLERANCE_S for answer in answers):
-            before = [answer.accepted for answer in answers if answer.t_s < t - TIME_TOLERANCE_S]
-            return (one if all(before[-1:]) else None), any(before[-1:])
-    return None, False

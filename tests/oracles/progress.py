@@ -10,7 +10,7 @@ from airground_drake.verify.runs.acceptances import METHOD
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.fault import Fault
-from oracles.protocol import answers_to, parts_of, withdrawn_s
+from oracles.protocol import held_until
 from oracles.sensing import news
 
 NO_DIFFERENCE = 1e-6
@@ -52,7 +52,7 @@ def wrong_answers(trace: Trace) -> list[Fault]:
 def _unended(trace: Trace, last: DecisionRecord) -> Iterator[Fault]:
     """An acceptance without a further decision: its proposal was withdrawn before the next sample, or the run over."""
     after = last.t_s + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
-    if withdrawn_s(trace, proposal_of(trace, last.number)) > after and after <= trace.t[-1]:
+    if held_until(trace, proposal_of(trace, last.number)) > after and after <= trace.t[-1]:
         yield Fault("an acceptance just ends", last.robot, last.t_s)
 
 
@@ -78,8 +78,6 @@ def _judged(trace: Trace, row: DecisionRecord, last: DecisionRecord | None, pati
         answer = ("refuse", "kept")
     else:
         answer = ("refuse", "exhausted") if patience.tries >= gate.tries else _by_outcome(row, on)
-        if answer[0] == "accept" and any(_refuses(trace, part, t) for part in parts_of(trace, on)):
-            answer = ("refuse", "joint_refused")
         if answer[0] == "accept":
             end = min(float(on.times_s[-1]), t + gate.longest_s)
             patience.tries, patience.since, patience.until = patience.tries + 1, t, end
@@ -87,13 +85,6 @@ def _judged(trace: Trace, row: DecisionRecord, last: DecisionRecord | None, pati
         yield Fault("answer or reason", row.robot, t, {"due": answer, "standing": standing})
     if given["tries"] != patience.tries:
         yield Fault("tries", row.robot, t, {"due": patience.tries, "recorded": given["tries"]})
-
-
-def _refuses(trace: Trace, part: ProposalRecord, t: float) -> bool:
-    """Whether the UGV of a part of a joint plan refuses it at t, s, on its own account."""
-    table = trace.decisions
-    now = table[(table["number"] == part.number) & (table["t_s"] == t) & (table["reason"] != "joint_refused")]
-    return len(now) > 0 and any(one.refused for one in answers_to(trace, part) if one.t_s == t)
 
 
 def _by_outcome(row: DecisionRecord, on: ProposalRecord) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.instants import GATED_METHODS, row_at
 from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of
+from oracles.channel import has_channel, heard, held
 from oracles.fault import Fault
 
 
@@ -47,36 +48,51 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
     """Messages of the trace that are not those of its proposals and decisions, or not withdrawn when they should be."""
     table, ends = trace.messages, trace.t[-1] - TIME_TOLERANCE_S
     of = {kind: table[table["kind"] == kind] for kind in ("proposal", "withdrawal", "answer")}
-    if sorted(of["answer"]["number"]) != [*range((trace.decisions["answer"] >= 0).sum())]:
+    told = trace.decisions["answer"][trace.decisions["answer"] >= 0]
+    numbers = sorted({*of["answer"]["number"]} if has_channel(trace) else of["answer"]["number"])
+    lacking = {*told} - {*numbers} if has_channel(trace) else len(told) != len(numbers)
+    if numbers != [*range(len(numbers))] or lacking:
         yield Fault("answers are not those of the decisions")
     period_s, read = trace.scenario.intervention.period_s, of["answer"].dropna(subset="read_s")
     waited_s = (read["read_s"] - read["sent_s"]).to_numpy(dtype=np.float64)
+    if has_channel(trace):
+        waited_s = np.zeros(0)  # see `oracles.channel`
     if ((waited_s <= 0.0) | (waited_s > max(period_s, trace.scenario.gatekeeper.period_s) + TIME_TOLERANCE_S)).any():
         yield Fault("answers are not read at the next planning instant")
-    withdrawn = dict(zip(of["withdrawal"]["about"].tolist(), of["withdrawal"]["sent_s"].tolist(), strict=True))
+    withdrawn = of["withdrawal"].groupby("about")["sent_s"].min().to_dict()
     for sent in proposals_of(trace):
         if sent.number not in {*of["proposal"]["number"]}:
             yield Fault("a proposal is no message", sent.ugv, sent.issued_s)
         due, recorded = withdrawn_s(trace, sent), withdrawn.get(sent.number, np.inf)
+        due = due if due < lost_s(trace, sent) - TIME_TOLERANCE_S else np.inf  # nobody is left to say so
         if min(due, ends) != min(recorded, ends) and abs(due - recorded) > TIME_TOLERANCE_S:
             yield Fault("withdrawn at another time", sent.ugv, sent.issued_s, {"due": due, "recorded": recorded})
 
 
 def _misused(trace: Trace) -> Iterator[Fault]:
-    """Wrong causes, joint plans not sent whole, decisions on withdrawn proposals, replacements without a reason."""
-    every = proposals_of(trace)
+    """Wrong senders and causes, joint plans not sent whole, decisions on what is over, needless replacements."""
+    every, scenario = proposals_of(trace), trace.scenario
+    heard = trace.messages[trace.messages["kind"] == "answer"].dropna(subset="read_s")
+    for uav, read_s in zip(heard["receiver"], heard["read_s"], strict=True):
+        if read_s > (scenario.aerial[uav].lost_at_s or np.inf) - TIME_TOLERANCE_S:
+            yield Fault("an answer is read by a UAV that is lost", uav, read_s)
     for sent in every:
+        if not {sent.ugv, sent.cause, *sent.party} <= {*scenario.in_charge(sent.sender)}:
+            yield Fault("sent by a UAV that is not in charge", sent.ugv, sent.issued_s, sent.sender)
+        if sent.issued_s > lost_s(trace, sent) - TIME_TOLERANCE_S:
+            yield Fault("sent by a UAV that is lost", sent.ugv, sent.issued_s, sent.sender)
         if not _is_cause(trace, sent):
             yield Fault("sent for a UGV that is not intervened on", sent.ugv, sent.issued_s, sent.cause)
         if missing := {*sent.party} - {sent.ugv, *(part.ugv for part in parts_of(trace, sent))}:
             yield Fault("part of a joint plan not sent", sent.ugv, sent.issued_s, sorted(missing))
-        end = withdrawn_s(trace, sent)
+        end = held_until(trace, sent)
         if late := [answer.t_s for answer in answers_to(trace, sent) if answer.t_s > end + TIME_TOLERANCE_S]:
             yield Fault("decision on what was withdrawn", sent.ugv, late[0], end)
     for ugv in trace.ugvs:
         for before, after in pairwise(sent for sent in every if sent.ugv == ugv):
             t, row = after.issued_s + TIME_TOLERANCE_S, row_at(trace, after.issued_s)
-            others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in trace.ugvs if other != ugv)
+            mates = [other for other in scenario.in_charge(after.sender) if other != ugv]
+            others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in mates)
             alone = not (after.party or others) and after.cause == ugv
             if alone and withdrawn_s(trace, before, unless_replaced=True) > t and before.times_s[-1] > t:
                 yield Fault("replaced while in force", ugv, after.issued_s, after.policy)
@@ -91,6 +107,11 @@ def _is_cause(trace: Trace, sent: ProposalRecord) -> bool:
     row = row_at(trace, sent.issued_s)
     called = {name: trace.column(f"{name}.mode")[row : row + 2] == 1.0 for name in (sent.ugv, sent.cause)}
     return bool(called[sent.cause].any()) and (sent.cause == sent.ugv or not called[sent.ugv].all())
+
+
+def lost_s(trace: Trace, sent: ProposalRecord) -> float:
+    """When the UAV that sent a proposal is lost, s; infinite if it never is."""
+    return trace.scenario.aerial[sent.sender].lost_at_s or np.inf
 
 
 def parts_of(trace: Trace, sent: ProposalRecord) -> list[ProposalRecord]:
@@ -108,8 +129,7 @@ def executed_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
     """The proposal that a UGV should execute, at each control sample of the run, or None.
 
     A proposal is in force from its sending until it is withdrawn (`withdrawn_s`). Under method (b) it is executed all
-    that time; under (c) and (d) while the gatekeeper's last decision accepts it. A part of a joint plan is executed
-    only while every other part in force is accepted or done.
+    that time; under (c) and (d) while the gatekeeper's last decision accepts it.
     """
 
     def found() -> list[ProposalRecord | None]:
@@ -123,21 +143,21 @@ def executed_at(trace: Trace, ugv: str) -> list[ProposalRecord | None]:
 
 
 def _in_force(trace: Trace, sent: ProposalRecord, now: float) -> bool:
-    """Whether a proposal was in force after the last planning instant up to `now`, s."""
+    """Whether a proposal was in force after the last planning instant up to `now`, s; with a channel, for its UGV."""
+    if has_channel(trace):
+        begin, end = held(trace, sent)
+        return begin <= now + TIME_TOLERANCE_S < end
     period = trace.scenario.intervention.period_s
     planned = period * np.floor(now / period + 1e-6) + TIME_TOLERANCE_S
     return bool(sent.issued_s <= planned < withdrawn_s(trace, sent))
 
 
 def _is_accepted(trace: Trace, sent: ProposalRecord, now: float) -> bool:
-    """Whether a proposal in force is accepted at `now`, s, and all other parts in force are accepted or done."""
+    """Whether a proposal in force is accepted at `now`, s."""
     if trace.meta["method"] not in GATED_METHODS:
         return True
     own = _answer_at(trace, sent, now)
-    if own is None or not own.accepted:
-        return False
-    others = [_answer_at(trace, part, now) for part in parts_of(trace, sent) if _in_force(trace, part, now)]
-    return not any(answer is None or answer.refused for answer in others)
+    return own is not None and own.accepted
 
 
 def _answer_at(trace: Trace, sent: ProposalRecord, now: float) -> Answer | None:
@@ -176,6 +196,8 @@ def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = F
     - the motion has run out;
     - another proposal is sent to the UGV (not counted with `unless_replaced`);
     - the UAV has a refusal of it, or of another part of its joint plan.
+
+    Once the UAV is lost, a proposal is over when its motion has run out, and nobody says so.
     """
 
     def first() -> float:
@@ -183,6 +205,19 @@ def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = F
         return min([alone, *(t for t, refused in (_over(trace, part) for part in parts_of(trace, sent)) if refused)])
 
     return trace.derived(("withdrawn", sent.number, unless_replaced), first)
+
+
+def held_until(trace: Trace, sent: ProposalRecord) -> float:
+    """When a UGV learns that a proposal is taken back, s."""
+    return held(trace, sent)[1] if has_channel(trace) else withdrawn_s(trace, sent)
+
+
+def known_answers(trace: Trace, sent: ProposalRecord, now: float) -> list[Answer]:
+    """The decision about a proposal that the UAV knows of at a planning instant, s, over a channel; [] if none."""
+    last = heard(trace, sent.ugv, now)
+    table = trace.decisions
+    (t,) = table.loc[table["answer"] == last["number"], "t_s"].tolist() or [None] if last else [None]
+    return [answer for answer in answers_to(trace, sent) if answer.t_s == t]
 
 
 def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> tuple[float, bool]:
@@ -195,9 +230,14 @@ def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> 
         now = k * period
         row = row_at(trace, now)
         before = [answer for answer in answers_to(trace, sent) if answer.t_s < now - TIME_TOLERANCE_S]
+        if has_channel(trace):
+            before = known_answers(trace, sent, now)
         refused = bool(before) and before[-1].refused
         # the clock's rounding decides whether a motion that ends at this very instant has run out
         ended = t[row] >= sent.times_s[-1] or (bool(before) and before[-1].done)
-        if not called[row] or ended or refused or replaced <= now + TIME_TOLERANCE_S:
+        if now >= lost_s(trace, sent) - TIME_TOLERANCE_S:
+            if t[row] >= sent.times_s[-1]:
+                return now, False
+        elif not called[row] or ended or refused or replaced <= now + TIME_TOLERANCE_S:
             return now, refused
     return np.inf, False

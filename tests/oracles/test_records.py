@@ -20,7 +20,6 @@ from verify.runs.cases import (
     at,
     executing,
     first,
-    for_another,
     problem,
     proposals,
     refused,
@@ -40,7 +39,7 @@ from airground_drake.sim.tables import SEEN_COLUMNS, typed
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import RADIUS, unpacked
 from airground_drake.verify.runs.proposals import proposals_of
-from oracles import ORACLES, commands, predictions
+from oracles import ORACLES, commands, faults_of, predictions
 from oracles.communication import SENSED_M
 from oracles.outcome_rolls import foreseen
 from oracles.protocol import answers_to
@@ -181,10 +180,6 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
         ("another try", B_D, first(executing, tries=2.0), "tries"),
         ("over too early", B_D, first(executing, decision="refuse", reason="over"), "answer or reason"),
         ("just ends", B_D, cut_short, "an acceptance just ends"),
-        ("of its own", JOINT, first(for_another, reason="stalls"), "answer or reason"),
-        ("accepts what another refuses", JOINT, first(for_another, decision="accept", reason="cheaper", tries=1.0),
-         "answer or reason"),
-        ("a try", JOINT, first(for_another, tries=1.0), "tries"),
     ),
     "inputs": (
         ("out of sight", B_D, first(accepted, sensed=[]), "recorded as sensed"),
@@ -192,8 +187,6 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
         ("news", B_D, first(executing, new=[0]), "recorded as new"),
         ("another map", B_D, other_map, "recorded as told"),
         ("told of", B_D, first(refused, told=[0]), "recorded as told"),
-        ("asked", B_D, first(refused, asked=[7]), "recorded as asked"),
-        ("accepted", B_D, first(refused, asked_accepted=[1]), "recorded as asked, accepted"),
     ),
 }  # fmt: skip
 """By oracle: what is edited, in which run, how, and what the oracle says."""
@@ -204,8 +197,8 @@ def acting(trace: Trace) -> int:
     return int(np.flatnonzero(trace.sampled("ugv1.executing") >= 0.0)[3])
 
 
-def test_a_refusal_for_another_ugv_is_no_fault(base: Base) -> None:
-    assert not ORACLES["progress"](base(JOINT))
+def test_a_joint_plan_that_only_some_accept_is_no_fault(base: Base) -> None:
+    assert not faults_of(base(JOINT))
 
 
 @pytest.mark.parametrize(("oracle", "row"), [(name, row) for name, rows in RECORDS.items() for row in rows],

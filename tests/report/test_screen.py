@@ -106,6 +106,10 @@ def away(robot: str = "r1", **way: Any) -> Edit:
     return edit
 
 
+def lost(at_s: float) -> Edit:
+    return lambda found: found["scenario"]["resolved"]["uav"].update(lost_at_s=at_s)
+
+
 def man(found: Document) -> None:
     found["scenario"]["resolved"]["obstacles"]["man"] = {"moves": {"waypoints_m": [AT_HOME] * 2, "speed_m_s": 1.0}}
 
@@ -229,6 +233,8 @@ def test_arrived(edits: list[Edit], mark: str, lines: list[str]) -> None:
         ("b", [sent((1.0, "released"), (None, "withdrawn first"))], ["2 sent: 1 not begun, 1 obeyed"]),
         ("d", [metric("messages", {"proposals": 1, "withdrawals": 1, "answers": 3, "always_on": {"proposals": 40}})],
          ["never called", "5 messages (always-on 40)"]),
+        ("d", [lost(2.0)], ["never called", "fly was lost at 2 s"]),
+        ("d", [lost(999.0)], ["never called"]),
     ],
 )  # fmt: skip
 def test_uav_proposals(method: str, edits: list[Edit], lines: list[str]) -> None:

@@ -99,6 +99,12 @@ EDITS: list[tuple[str, object]] = [
     ("decision.threshold.rule", "x"),
     ("runs.d.method", "e"),
     ("intervention.policies.0.name", "detuor"),
+    ("channel.loss", 1),
+    ("channel.delay_s", -0.1),
+    ("channel.duplicate", 1.5),
+    ("channel.los", 0.1),
+    ("channel.up", {"loss": -0.5}),
+    ("channel.up", {"delay": 1}),
     # runs, reproduction, choices
     ("runs.d.stalls_m.three", [1, 0, 0]),
     ("runs.d.expected.SAFE", "holds"),

@@ -10,7 +10,7 @@ from builders.shapes import from_core, rectangle
 
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.geometry.outline import balls, corners_of, prism, stacked
-from airground_drake.model.geometry.paths import Path, shortest_path
+from airground_drake.model.geometry.paths import Path, PathsFrom
 from airground_drake.uav import detour
 from airground_drake.uav.coordinate import Coordinate
 from airground_drake.uav.database import predicted_cost
@@ -118,12 +118,13 @@ def test_the_predicted_cost_counts_intrusion_into_obstacles_and_every_teammate()
 def test_a_preset_that_runs_away_is_met_with_few_paths(ratio: float, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[float] = []
 
-    def counting(*args: Any) -> Path:
-        path = shortest_path(*args)
-        asked.append(path.length_m)
-        return path
+    class Counting(PathsFrom):
+        def to(self, goal: Any) -> Path:
+            path = super().to(goal)
+            asked.append(path.length_m)
+            return path
 
-    monkeypatch.setattr(detour, "shortest_path", counting)
+    monkeypatch.setattr(detour, "PathsFrom", Counting)
     runs = Motion(np.array([0.0, 100.0 / ratio]), np.array([[5.0, 0.0, 0.0], [105.0, 0.0, 0.0]]))
     what = seen([mate("ugv1", [0.0, 0.0], [105.0, 0.0])])
     motion = DETOUR.propose(replace(what, preset=runs, t=0.0, start=0.0))

@@ -111,21 +111,6 @@ def test_one_refusal_withdraws_a_joint_plan_for_all() -> None:
     assert not step(uav, memory, 2.2, "one three").talks[1].proposal  # nobody asks it for itself
 
 
-def test_who_refuses_only_because_another_does_is_asked_again_at_once() -> None:
-    policy = Scripted({"one": wait(9.0), "two": wait(9.0), "three": wait(9.0)})
-    uav, no = planner(policy), dict.fromkeys(UGVS, REFUSE)
-    memory = step(uav, uav.start(), 1.0, "one three")
-    step(uav, memory, 1.1, "one three", no, reasons=["joint_refused", "stalls", "joint_refused"])
-    one, two, three = policy.seen[1].team
-    assert [(each.refusals, each.too_fast, each.resting) for each in (one, two, three)] == [
-        (0, 0, False), (1, 1, True), (0, 0, False),
-    ]  # fmt: skip
-    uav = planner(Scripted({"one": wait(9.0)}))
-    memory = step(uav, uav.start(), 1.0, "one")
-    memory = step(uav, memory, 1.1, "one", {"one": REFUSE}, reasons=["joint_refused"] * 3)
-    assert memory.talks[0].refusals == 1  # nobody else refused
-
-
 @pytest.mark.parametrize(("end", "too_fast"), [(0.0, 0), (0.9, 0), (1.1, 1)])
 def test_a_motion_that_leaves_its_ugv_behind_was_too_fast(end: float, too_fast: int) -> None:
     """It is at (0, 0) at a limit of 1 m/s."""
@@ -165,16 +150,9 @@ def test_a_part_that_is_over_leaves_the_others_in_force(t: float, two: float) ->
 
 @pytest.mark.parametrize(
     ("answers", "executed"),
-    [
-        ((ACCEPT, ACCEPT, ACCEPT), "one two three"),
-        ((ACCEPT, SILENT, ACCEPT), "three"),
-        ((ACCEPT, REFUSE, SILENT), ""),
-        ((ACCEPT, DONE, SILENT), "one"),
-        ((REFUSE, ACCEPT, ACCEPT), "three"),
-    ],
+    [((ACCEPT, ACCEPT, SILENT), "one two"), ((ACCEPT, SILENT, REFUSE), "one"), ((DONE, ACCEPT, ACCEPT), "two three")],
 )
-def test_a_joint_plan_takes_effect_if_all_accept(answers: tuple[float, ...], executed: str) -> None:
-    """`one` and `two` have parts of a joint plan; `three` has a proposal of its own, sent at the same instant."""
+def test_a_part_of_a_joint_plan_is_executed_when_its_ugv_accepts(answers: tuple[float, ...], executed: str) -> None:
     uav = planner(Scripted({"one": wait(9.0), "two": wait(9.0)}, {"three": wait(9.0)}))
     proposals = step(uav, uav.start(), 1.0, "one three").proposals
     given = np.array([number for p, said in zip(proposals, answers, strict=True) for number in (said, p.number)])

@@ -89,32 +89,14 @@ def test_only_another_ugv_is_made_way_for(cause: str, answer: float) -> None:
     ]
 
 
-def part(number: int, cause: str, joint: int = 0) -> Proposal:
-    """A part of a joint plan, accepted only as a favour; those with an odd number are for the other UGV."""
-    motion = Motion(STAYS.times, np.array([[0.0, 90.0, 0.0]] * 2)) if number % 2 else STAYS
-    return replace(making_way(number, cause), motion=motion, issued=float(joint), party=("other", "ugv"))
-
-
-def test_who_shares_a_joint_plan_with_one_that_refuses_refuses_too_and_has_not_tried() -> None:
+def test_a_part_of_a_joint_plan_is_judged_by_its_own_ugv_alone() -> None:
     team = Team()
-    for number in range(0, 10, 2):  # more often than there are tries
-        turn = team.sees(part(number, "other", number), other=part(number + 1, "other", number))
-        assert [each.reason for each in team.memory.decisions] == ["joint_refused", "not_cheaper"]
-        assert [each.tries for each in team.memory.decisions] == [0, 0]
-        assert team.memory.answers == (REFUSE, number, REFUSE, number + 1)
-        assert turn == Commitment()
-    team.sees(part(8, "other", 8), other=None)  # the other part is gone: a refusal stays a refusal
-    assert [each.reason for each in team.memory.decisions] == ["kept"]
-    assert team.memory.answers[:2] == (REFUSE, 8)
-
-
-def test_only_new_acceptances_of_the_same_joint_plan_are_reversed() -> None:
-    team = Team()
-    assert team.sees(part(0, "other"), other=None).tries == 1
-    team.sees(part(0, "other"), other=part(1, "other"))  # was sent late: what was accepted before stands, unexecuted
-    assert [each.reason for each in team.memory.decisions] == ["kept", "not_cheaper"]
-    assert team.sees(part(2, "other", 1), other=part(3, "other", 2)).executing
+    motion = Motion(STAYS.times, np.array([[0.0, 90.0, 0.0]] * 2))
+    parts = [replace(making_way(number, "other"), party=("other", "ugv")) for number in (0, 1)]
+    turn = team.sees(parts[0], other=replace(parts[1], motion=motion))
     assert [each.reason for each in team.memory.decisions] == ["makes_way", "not_cheaper"]
+    assert team.memory.answers == (ACCEPT, 0.0, REFUSE, 1.0)
+    assert turn.executing
 
 
 def test_a_withdrawal_is_noticed_when_nothing_else_is_proposed() -> None:

@@ -76,8 +76,8 @@ def log(loop: Batch) -> Log:
 
 
 def moved(log: Log) -> Log:
-    """A robot jumps."""
-    log.bodies[200:, 0] += 1e-6
+    """The UAV jumps."""
+    log.bodies[200:, 6] += 1e-6
     return log
 
 

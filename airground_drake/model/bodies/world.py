@@ -38,6 +38,7 @@ class Body:
         max_speed_m_s: speed limit, or the speed that robots expect of an obstacle at most.
         appears_s: time from which on an obstacle is there, s.
         disappears_s: time from which on it is not there any more, s.
+        error_m: of a robot, bound of the error of its measured position, m.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Body:
     max_speed_m_s: float = 0.0
     appears_s: float = 0.0
     disappears_s: float = np.inf
+    error_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the kind and the speed limit."""
@@ -66,7 +68,9 @@ class Body:
     @property
     def bounds(self) -> Bounds:
         """How far a robot may be from where the law steers it."""
-        return self.plant.bounds(self.max_speed_m_s) if self.plant and self.kind in ROBOTS else AT_REST
+        if not (self.plant and self.kind in ROBOTS):
+            return AT_REST
+        return self.plant.bounds(self.max_speed_m_s)._replace(error_m=self.error_m)
 
 
 class Neighbours(NamedTuple):

@@ -120,27 +120,46 @@ def shortest_path(start: ArrayLike, goal: ArrayLike, rows: Array, keep: ArrayLik
             the goal are in different components of the free space.
         ValueError: if a number is not finite.
     """
-    given = start, goal, rows, keep
+    return PathsFrom(start, rows, keep).to(goal)
+
+
+class PathsFrom:
+    """Shortest paths from one start to any goal, each as `shortest_path`, among the same obstacles."""
+
+    def __init__(self, start: ArrayLike, rows: Array, keep: ArrayLike) -> None:
+        _need_finite(start, rows, keep)
+        self._start, self._flat_rows = complex(*np.asarray(start)), _flat(rows)
+        self._reach = np.asarray(keep, dtype=np.float64)
+        self._around = _Obstacles.of(self._flat_rows, self._reach)
+
+    @cached_property
+    def _free(self) -> complex:
+        """The start, or where it leaves the obstacles."""
+        inside = self._around.lack(self._start) is not None
+        return _escape(self._start, self._around) if inside else self._start
+
+    def to(self, goal: ArrayLike) -> Path:
+        """The path to a goal, (2,), m; NoPath as for `shortest_path`."""
+        _need_finite(goal)
+        p, q = self._start, complex(*np.asarray(goal))
+        if (lacking := self._around.lack(q)) is not None:
+            raise NoPath(f"goal {_show(q)} is inside {lacking}")
+        around = self._around.shrunk(self._free).shrunk(q)
+        begin, end = _places(np.array([self._free, q]))
+        many = len(around.circles[1]) > FEW  # without a way the search would take long to come to an end
+        apart = many and are_separated(begin, end, self._flat_rows, self._reach - _EPS)
+        route = None if apart else _route_among(self._free, q, around)
+        if route is None:
+            raise NoPath(f"no way from start {_show(p)} to goal {_show(q)}: obstacles enclose one of them")
+        leg = np.array([self._free - p])
+        pieces = np.concatenate((_rows(np.array([p]), leg, np.zeros(1), abs(leg)), route))
+        kept = pieces[:, 5] > _EPS
+        return Path(pieces[kept] if kept.any() else np.array([[p.real, p.imag, 0.0, 0.0, 0.0, 0.0]]))
+
+
+def _need_finite(*given: ArrayLike) -> None:
     if not all(np.isfinite(numbers).all() for numbers in given):
         raise ValueError(f"a path needs finite numbers, got {given}")
-    p, q = complex(*np.asarray(start)), complex(*np.asarray(goal))
-    rows, reach = _flat(rows), np.asarray(keep, dtype=np.float64)
-    around = _Obstacles.of(rows, reach)
-    if (lacking := around.lack(q)) is not None:
-        raise NoPath(f"goal {_show(q)} is inside {lacking}")
-    free = p if around.lack(p) is None else _escape(p, around)
-    for point in (free, q):
-        around = around.shrunk(point)
-    begin, end = _places(np.array([free, q]))
-    many = len(around.circles[1]) > FEW  # without a way the search would take long to come to an end
-    apart = many and are_separated(begin, end, rows, reach - _EPS)
-    route = None if apart else _route_among(free, q, around)
-    if route is None:
-        raise NoPath(f"no way from start {_show(p)} to goal {_show(q)}: obstacles enclose one of them")
-    leg = np.array([free - p])
-    pieces = np.concatenate((_rows(np.array([p]), leg, np.zeros(1), abs(leg)), route))
-    kept = pieces[:, 5] > _EPS
-    return Path(pieces[kept] if kept.any() else np.array([[p.real, p.imag, 0.0, 0.0, 0.0, 0.0]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +259,10 @@ class _Obstacles:
 
     def shrunk(self, point: complex) -> Self:
         """These obstacles, but with a point that is up to TOL inside on the boundary."""
-        r, keep = np.minimum(self.r, abs(self.c - point)), np.minimum(self.keep, self.distances(point))
-        return replace(self, r=r, keep=keep)
+        far, farther = abs(self.c - point), self.distances(point)
+        if (self.r <= far).all() and (self.keep <= farther).all():
+            return self  # with what is known of its circles
+        return replace(self, r=np.minimum(self.r, far), keep=np.minimum(self.keep, farther))
 
     def some(self, which: NDArray[np.bool_]) -> Self:
         """Some of discs and polygons, (m + k,)."""

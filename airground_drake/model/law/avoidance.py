@@ -68,6 +68,8 @@ class Avoidance:
             projection over the active set, shortened to be exact in floating point. 'recursion_nearest' and
             'recursion_listed' apply (5) as printed to the same constraints, with the nearest or the first listed
             obstacle as highest priority. They are there to show that (5) is not safe.
+        stands: whether a robot stands where no velocity meets all constraints, for positions that are measured; by
+            default it takes the least violation. Only with 'augmented'.
 
     Raises:
         ValueError: if gain or sensing range is negative, the period not positive, or gain or period not finite.
@@ -77,6 +79,7 @@ class Avoidance:
     period: float
     sensing_range: float = np.inf
     composition: Composition = "augmented"
+    stands: bool = False
 
     def __post_init__(self) -> None:
         """Refuse numbers that mean nothing."""
@@ -86,7 +89,9 @@ class Avoidance:
     @property
     def layer(self) -> kernels.Layer:
         """The numbers as the kernels take them."""
-        return kernels.Layer(float(self.gain), float(self.period), float(self.sensing_range), _CODES[self.composition])
+        stands = self.stands and self.composition == "augmented"
+        code = kernels.STANDING if stands else _CODES[self.composition]
+        return kernels.Layer(float(self.gain), float(self.period), float(self.sensing_range), code)
 
     def half_spaces(self, positions: Array, near: Neighbours) -> HalfSpaces:
         """Constraints of k robots when all bodies that move are at positions (M, 3) m."""

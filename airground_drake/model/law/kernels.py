@@ -33,6 +33,9 @@ DEPENDENT = 1e-20
 ROUNDING = 1e-15  # relative rounding error up to which a constraint counts as met
 
 AUGMENTED, RECURSION_NEAREST, RECURSION_LISTED = 0, 1, 2
+# Augmented, but the robot stands where no velocity meets all constraints: where they come from measured positions, the
+# least violation may lead the wrong way, and standing keeps what there is.
+STANDING = 3
 
 
 class Layer(NamedTuple):
@@ -124,22 +127,34 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
     else:
         return lower.copy()
     if composition == AUGMENTED:
-        velocity = _closest_feasible(lower, normal, bound)
-        speed = _dot(velocity, velocity)
-        velocity = _scale_back(velocity, normal, bound)
-        if _dot(velocity, velocity) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
-            return velocity
-        # between two bodies that it touches no margin fits: the exact bounds, which let it slide along
-        touched = bound.copy()
+        return _augmented(lower, normal, bound)
+    if composition == STANDING:
+        velocity = _augmented(lower, normal, bound)
         for k in range(len(bound)):
-            if bound[k] <= CONTRADICTION_M_S:
-                touched[k] = np.minimum(bound[k], 0.0)
-        exactly, missed = _closest(lower, normal, touched, CONTRADICTION_M_S)
-        if missed > 0.0:
-            return velocity
-        exactly = _scale_back(exactly, normal, bound)
-        return exactly if _dot(exactly, exactly) > _dot(velocity, velocity) else velocity
+            if _dot(normal[k], velocity) < bound[k] - CONTRADICTION_M_S:
+                return np.zeros(3)
+        return velocity
     return _recursion(lower, normal, bound, composition == RECURSION_NEAREST)
+
+
+@njit(cache=True)
+def _augmented(lower: Array, normal: Array, bound: Array) -> Array:
+    """The closest velocity to `lower` under all constraints, exact in floating point; see `Avoidance`."""
+    velocity = _closest_feasible(lower, normal, bound)
+    speed = _dot(velocity, velocity)
+    velocity = _scale_back(velocity, normal, bound)
+    if _dot(velocity, velocity) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
+        return velocity
+    # between two bodies that it touches no margin fits: the exact bounds, which let it slide along
+    touched = bound.copy()
+    for k in range(len(bound)):
+        if bound[k] <= CONTRADICTION_M_S:
+            touched[k] = np.minimum(bound[k], 0.0)
+    exactly, missed = _closest(lower, normal, touched, CONTRADICTION_M_S)
+    if missed > 0.0:
+        return velocity
+    exactly = _scale_back(exactly, normal, bound)
+    return exactly if _dot(exactly, exactly) > _dot(velocity, velocity) else velocity
 
 
 @njit(cache=True)

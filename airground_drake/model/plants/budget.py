@@ -12,6 +12,14 @@ where b is what delays and lags cost. With V the slower speed limit, V_rel the s
 
 Beside a set at rest a delay costs nothing and a lag sqrt(d^2 + (tau V)^2) - d. Beside an obstacle that may move the law
 only promises that the robot does not come nearer by itself. There lag and delay count as covers, tau V and delta V.
+
+Where the law acts on measured positions, off by e_i and e_j at most, e = e_i + e_j and (theorem Budget.budget_always)
+
+    d_law = e + sqrt((d + b + covers + dips)^2 + e^2) + (drift_i + drift_j) / A',
+
+if e (1 - A' h) <= A' h times what the points then keep at the samples, d_law - e - drifts / A'. Beside a set at rest
+A' = A. Of two robots one may have to stand, because measured inequalities contradict one another: then the pair meets
+the law with A' = A / 2 (theorem Budget.one_stands).
 """
 
 from __future__ import annotations
@@ -37,11 +45,14 @@ class Bounds(NamedTuple):
     # Whether the body is drawn after the steered point, as a trailer: then beside a set at rest a cover l costs
     # sqrt(d^2 + l^2) - d (theorem Plants.forwards).
     drawn: bool = False
+    error_m: float = (
+        0.0  # of the measured position of the steered point; both of a pair use the same measured positions
+    )
 
     @property
     def exact(self) -> bool:
-        """Whether the body is the steered point and moves as it is told."""
-        return not any(self[:5])
+        """Whether the body is the steered point, moves as it is told, and is where it is seen."""
+        return not (any(self[:5]) or self.error_m)
 
     @property
     def late(self) -> bool:
@@ -79,13 +90,36 @@ def law_distance(
         kept = _lagging(kept, one, other)
     if _draws(one, other, passive=passive):
         kept = np.hypot(kept, one.cover_m)
-    return kept + sum(cost.metres for cost in _added(one, other, gain=gain, passive=passive))
+    added = list(_added(one, other, gain=gain, passive=passive))
+    error = one.error_m + other.error_m
+    if not error:
+        return kept + sum(cost.metres for cost in added)
+    kept = kept + sum(cost.metres for cost in added if cost.term != "drift")
+    return error + np.hypot(kept, error) + sum(cost.metres for cost in added if cost.term == "drift")
+
+
+def part_of_gain(one: Bounds, other: Bounds = AT_REST) -> float:
+    """A' / A of a pair: a half where one of two robots may have to stand, else 1."""
+    return 0.5 if one.error_m + other.error_m and other != AT_REST else 1.0
+
+
+def least_gain(distance: float, one: Bounds, other: Bounds = AT_REST) -> float:
+    """The least A h with which a pair bears the errors of its measured positions, for a `distance` of bodies, m."""
+    error = one.error_m + other.error_m
+    undrifting = one._replace(drift_m_s=0.0), other._replace(drift_m_s=0.0)
+    kept = float(law_distance(distance, *undrifting, gain=1.0)) - error
+    return error / (error + kept) / part_of_gain(one, other) if error else 0.0
 
 
 def kept_distance(points: float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False) -> float:
     """Distance that bodies keep where their steered points keep `points`, m, from below: `law_distance` inverted."""
     # -inf where nothing is promised: within tau V of a set, say, the body may be anywhere beside it.
-    left = points - sum(cost.metres for cost in _added(one, other, gain=gain, passive=passive))
+    added = list(_added(one, other, gain=gain, passive=passive))
+    if error := one.error_m + other.error_m:
+        drifts = sum(cost.metres for cost in added if cost.term == "drift")
+        points = _leg(points - drifts - error, error)
+        added = [cost for cost in added if cost.term != "drift"]
+    left = points - sum(cost.metres for cost in added)
     if passive:
         return left
     if _draws(one, other, passive=passive):
@@ -115,11 +149,15 @@ def costs(distance: float, one: Bounds, other: Bounds = AT_REST, *, gain: float,
         found += [Cost("delay", -1, delay), Cost("lag", -1, lag)]
     if _draws(one, other, passive=passive):
         found.insert(0, Cost("cover", 0, math.hypot(distance, one.cover_m) - distance))
+    if error := one.error_m + other.error_m:
+        kept = distance + sum(cost.metres for cost in found if cost.term != "drift")
+        found.append(Cost("error", -1, error + math.hypot(kept, error) - kept))
     return [cost for cost in found if cost.metres > 0.0]
 
 
 def _added(one: Bounds, other: Bounds, *, gain: float, passive: bool) -> Iterator[Cost]:
     """The terms that are the same for all distances, but for a delay."""
+    gain *= part_of_gain(one, other)
     for k, bounds in enumerate((one, other)):
         yield Cost("cover", k, 0.0 if k == 0 and _draws(one, other, passive=passive) else bounds.cover_m)
         yield Cost("dip", k, bounds.dip_m)

@@ -53,8 +53,9 @@ class LeftToDrakeError(Exception):
 class Batch:
     """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
-    # Left to Drake: users' plants and controllers, lags and delays, several UAVs, and tasks of the UAV that are not the
-    # package's; monitors, observers, decision blocks and disturbances are no part of a scenario.
+    # Left to Drake: users' plants and controllers, channels, errors of positions, several UAVs, one that is lost, tasks
+    # of the UAV that are not the package's. Monitors, observers, decision blocks and disturbances are no part of a
+    # scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Set it up: everything that does not depend on the seed."""
@@ -67,9 +68,15 @@ class Batch:
         for body in world.moving:
             if not isinstance(body.plant, FirstOrder | Unicycle | Lag | Delay | Scripted):
                 raise LeftToDrakeError(f"the plant of {body.name}")
+        if given.sensing is not None:
+            raise LeftToDrakeError("errors of measured positions")
         (flown_by, uav), *more = given.aerial.items()
+        if given.channel is not None and method.intervenes:
+            raise LeftToDrakeError("a channel")
         if more:
             raise LeftToDrakeError("several UAVs")
+        if uav.lost_at_s:
+            raise LeftToDrakeError("a UAV that is lost")
         if given.ugv_controller is not None:
             raise LeftToDrakeError(f"the controller {given.ugv_controller.kind} of the UGVs")
         if UAV_TASKS.load(uav.task, of=Task) is not FormationTask:

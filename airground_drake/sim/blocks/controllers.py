@@ -170,7 +170,7 @@ def _asked(proposal: Proposal, t: float) -> AcceptedMotion:
 
 
 class UavController(_Controller):
-    """NSBC of a UAV: obstacle avoidance (11) above a task, by default to stay over the UGVs' centroid, (9)-(10).
+    """NSBC of a UAV: obstacle avoidance (11) above a task, by default to stay over its UGVs' centroid, (9)-(10).
 
     Ports (n UGVs, M bodies that move, world frame):
         in  `bodies` (3M) m; `ugv_command` (3n) m/s, fed forward as the centroid's rate.
@@ -190,6 +190,7 @@ class UavController(_Controller):
         gain: float,
         altitude: float,
         uav: str = "",
+        ugvs: Sequence[str] = (),
         task: Callable[[Array, Array, float, float], Task] = FormationTask,
     ) -> None:
         """Declare ports, state and the periodic update.
@@ -200,7 +201,8 @@ class UavController(_Controller):
             gain: of the task, 1/s, by default.
             altitude: m.
             uav: name of the UAV; default: the first of the world.
-            task: makes the task of a sample from positions (n, 3), m, and velocities (n, 3), m/s, of the UGVs,
+            ugvs: names of the k UGVs that it is in charge of; default: all.
+            task: makes the task of a sample from positions (k, 3), m, and velocities (k, 3), m/s, of these UGVs,
                 altitude and gain; it gives the velocity of one robot, (1, 3), m/s.
         """
         super().__init__()
@@ -209,7 +211,9 @@ class UavController(_Controller):
         self._gain = gain
         self._altitude = altitude
         row = world.robots.index(uav) if uav else world.select("uav").start
-        self._world, self._ugvs, self._own = world, world.select("ugv"), slice(row, row + 1)
+        self._world, self._own = world, slice(row, row + 1)
+        some = 0 < len(ugvs) < len(world.names("ugv"))
+        self._ugvs = [world.index(ugv) for ugv in ugvs] if some else world.select("ugv")
         self._near = world.around(self._own)
         self._bodies = declare_bodies(self, world)
         self._ugv_command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
@@ -249,7 +253,7 @@ class UavController(_Controller):
 
     def _asked(self, positions: Array, ugv_commands: Array, gain: float) -> Array:
         """Velocity that the task asks for, (1, 3), m/s. The answer of a third-party task is checked."""
-        ugvs, own = positions[self._ugvs], positions[self._own]
+        ugvs, own, ugv_commands = positions[self._ugvs], positions[self._own], ugv_commands[self._ugvs]
         if self._task is FormationTask:
             return FormationTask(ugvs, ugv_commands, self._altitude, gain).velocity(own)
         name = getattr(self._task, "__name__", type(self._task).__name__)
@@ -276,24 +280,30 @@ def read_back(near: Neighbours, avoidance: Avoidance, robots: int, sampling_s: l
     """The parameters with which a controller's avoidance runs, strict JSON, for the trace; `robots` move."""
     # Returns for its k robots: `members`, their indices in the order of the world; `outlines` of the m convex parts at
     # rest, without padding, one after the other; `moving_outlines`, those of obstacles that move, about their origins,
-    # if there are any; `others`, indices of the bodies of the n parts that each avoids besides what is at rest, (k, n);
+    # if there are any; `stands`, if robots stand where inequalities contradict one another; `others`, indices of the
+    # bodies of the n parts that each avoids besides what is at rest, (k, n);
     # `safe_m` and `share` beside the parts at rest, then beside the others, (k, m + n); `mobility` (k, 3);
     # `max_speed_m_s` (k,). For the layer: `sampling_s`, period and offset; `gain_1_s`, `period_s`, `sensing_range_m`.
     # Arrays are flat, in C order; `safe_m` and `share` are lists of [value, number of repetitions].
     moving = [number for row in near.parts[robots:] for number in outline.as_tuple(row)]
-    return ({"moving_outlines": moving} if moving else {}) | {
-        "members": near.members.tolist(),
-        "outlines": [number for row in near.still for number in outline.as_tuple(row)],
-        "others": near.carrier[near.others].ravel().tolist(),
-        "safe_m": _in_runs(near.distance),
-        "share": _in_runs(near.share),
-        "mobility": near.mobility.ravel().tolist(),
-        "max_speed_m_s": near.max_speed.tolist(),
-        "sampling_s": sampling_s,
-        "gain_1_s": avoidance.gain,
-        "period_s": avoidance.period,
-        "sensing_range_m": avoidance.sensing_range,
-    }
+    more: dict[str, Any] = {"moving_outlines": moving} if moving else {}
+    return (
+        more
+        | ({"stands": True} if avoidance.stands else {})
+        | {
+            "members": near.members.tolist(),
+            "outlines": [number for row in near.still for number in outline.as_tuple(row)],
+            "others": near.carrier[near.others].ravel().tolist(),
+            "safe_m": _in_runs(near.distance),
+            "share": _in_runs(near.share),
+            "mobility": near.mobility.ravel().tolist(),
+            "max_speed_m_s": near.max_speed.tolist(),
+            "sampling_s": sampling_s,
+            "gain_1_s": avoidance.gain,
+            "period_s": avoidance.period,
+            "sensing_range_m": avoidance.sensing_range,
+        }
+    )
 
 
 def _in_runs(array: Array) -> list[list[float]]:

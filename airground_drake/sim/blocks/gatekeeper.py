@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
@@ -13,13 +15,15 @@ from airground_drake.sim.blocks.signals import (
     UgvGains,
     declare_bodies,
     declare_headings,
+    declare_inbox,
     laid_out,
     no_reports,
 )
 from airground_drake.sim.blocks.ticks import Ticks
-from airground_drake.uav.messages import ACCEPT, SILENT, Report
+from airground_drake.uav.messages import Report
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import GatekeeperDecision
+from airground_drake.ugv.desk import Desk, Obeying, obeyed, read, replied
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 
 
@@ -36,23 +40,32 @@ class Gatekeeper(LeafSystem):
             `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None. With unicycles
             `headings` (n), rad.
         out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
+        With a channel `inbox`, see `Downlink`, in place of `proposals`, which is an output for the controllers then;
+        and an output `outbox`, all answers sent so far.
     State: abstract, a `GatekeeperState`, with all decisions of the run so far.
     Fixed at construction: horizon and weights of (25), margins, dwell, budget and patience; the gains are inputs.
     Rate: one update per gatekeeper period, from t = 0.
     """
 
-    def __init__(self, gatekeepers: Gatekeepers, world: World, *, period: float, control: float) -> None:
+    def __init__(
+        self, gatekeepers: Gatekeepers, world: World, *, period: float, control: float, retry: float | None = None
+    ) -> None:
         """Declare ports, state and the update every `period`, s; the controllers' period is `control`, s."""
+        # retry: with a channel, after how long a refusal is repeated, s
         super().__init__()
         n = len(world.names("ugv"))
         self._gatekeepers, self._world = gatekeepers, world
         self._bodies, self._headings = declare_bodies(self, world), declare_headings(self, world)
         self._command = self.DeclareVectorInputPort("team_command", 3 * len(world.robots))
         self._gains = self.DeclareVectorInputPort("gains", len(UgvGains.get_fields()))
-        self._proposals = Messages(self, "proposals", n, Proposal)
-        state = self.DeclareAbstractState(Value(GatekeeperState.empty(n)))
+        self._retry = retry
+        state = self.DeclareAbstractState(Value(GatekeeperState.empty(n, channel=retry is not None)))
         self._state = int(state)
         held = {self.abstract_state_ticket(state)}
+        if retry is None:
+            self._proposals = Messages(self, "proposals", n, Proposal)
+        else:
+            self._inbox = declare_inbox(self, n, held, weakly(self._calc_held), weakly(self._calc_outbox))
         self.DeclareVectorOutputPort("answers", 2 * n, weakly(self._calc_answers), prerequisites_of_calc=held)
         self.DeclareAbstractOutputPort(
             "reports", lambda: no_reports(n), weakly(self._calc_reports), prerequisites_of_calc=held
@@ -79,18 +92,41 @@ class Gatekeeper(LeafSystem):
     def _calc_reports(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self._memory(context).reports)
 
+    def desk(self, context: Context) -> Desk:
+        """With a channel, what was read and answered up to the last sample."""
+        return self._memory(context).desk or Desk.empty(0)
+
+    def _now(self, context: Context) -> Desk:
+        """The desk when all is read that has arrived."""
+        return read(self.desk(context), self._inbox.Eval(context), context.get_time())
+
+    def _calc_held(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self._now(context).held)
+
+    def _calc_outbox(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.desk(context).outbox)
+
     def _update(self, context: Context, state: State) -> EventStatus:
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
-        proposals, before = self._proposals.Eval(context), self._memory(context)
+        before = self._memory(context)
+        desk = None if self._retry is None else self._now(context)
+        proposals = self._proposals.Eval(context) if desk is None else desk.held
         positions = self._bodies.Eval(context).reshape(-1, 3)
-        if self._gatekeepers.idle(context.get_time(), proposals, positions, before):
+        idle = self._gatekeepers.idle(context.get_time(), proposals, positions, before)
+        if idle and desk is before.desk:
             return EventStatus.DidNothing()
         velocities = self._world.velocities(context.get_time(), self._command.Eval(context).reshape(-1, 3))
         law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())
         headings = None if self._headings is None else self._headings.Eval(context)
         now = Inputs(context.get_time(), proposals, positions, velocities, law, headings)
-        state.get_mutable_abstract_state(self._state).set_value(self._gatekeepers.sample(now, before))
+        after = self._gatekeepers.sample(now, before)
+        if desk is not None and self._retry is not None:
+            new = self._inbox.Eval(context)[len(self.desk(context).read_s) :]
+            asked = {delivery.message.ugv for delivery in new}
+            desk, told = replied(desk, asked, after.answers, after.reports, after.told, now.t, self._retry)
+            after = replace(after, desk=desk, told=told)
+        state.get_mutable_abstract_state(self._state).set_value(after)
         return EventStatus.Succeeded()
 
 
@@ -98,15 +134,24 @@ class DirectAcceptance(LeafSystem):
     """Method (b): every proposal is accepted at once.
 
     Ports (n UGVs): in `proposals` abstract; out `answers` (2n) and `reports` (abstract, always empty), see
-    `messages`.
+    `messages`. With a channel as `Gatekeeper`.
+    State: with a channel, an `Obeying`, updated every control period.
     """
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, *, channel_period: float | None = None) -> None:
+        """Of so many UGVs; with a channel the controllers' period, s."""
         super().__init__()
-        self._proposals = Messages(self, "proposals", count, Proposal)
-        self.DeclareVectorOutputPort(
-            "answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc={self._proposals.port.ticket()}
-        )
+        self._channel = channel_period is not None
+        if channel_period is None:
+            self._proposals = Messages(self, "proposals", count, Proposal)
+            needs = {self._proposals.port.ticket()}
+        else:
+            state = self.DeclareAbstractState(Value(Obeying.empty(count)))
+            self._state, held = int(state), {self.abstract_state_ticket(state)}
+            self._inbox = declare_inbox(self, count, held, weakly(self._calc_held), weakly(self._calc_outbox), now=True)
+            needs = {*held, self._inbox.ticket()}
+            self.DeclarePeriodicUnrestrictedUpdateEvent(channel_period, 0.0, weakly(self._update))
+        self.DeclareVectorOutputPort("answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc=needs)
         self.DeclareAbstractOutputPort(
             "reports",
             lambda: no_reports(count),
@@ -114,6 +159,28 @@ class DirectAcceptance(LeafSystem):
             prerequisites_of_calc={self.nothing_ticket()},
         )
 
+    def desk(self, context: Context) -> Desk:
+        """With a channel, what was read and answered up to the time of this Context."""
+        return self._now(context).desk
+
+    def _now(self, context: Context) -> Obeying:
+        before: Obeying = context.get_abstract_state(self._state).get_value()
+        return before.after(self._inbox.Eval(context))
+
     def _calc_answers(self, context: Context, output: BasicVector) -> None:
-        answers = [[SILENT, -1.0] if p is None else [ACCEPT, p.number] for p in self._proposals.Eval(context)]
-        output.SetFromVector(laid_out(Answer, answers))
+        held = self.desk(context).held if self._channel else self._proposals.Eval(context)
+        output.SetFromVector(laid_out(Answer, obeyed(held)))
+
+    def _calc_held(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.desk(context).held)
+
+    def _calc_outbox(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.desk(context).outbox)
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        held = state.get_mutable_abstract_state(self._state)
+        now = self._now(context)
+        if now is held.get_value():
+            return EventStatus.DidNothing()
+        held.set_value(now)
+        return EventStatus.Succeeded()

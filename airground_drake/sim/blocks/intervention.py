@@ -1,21 +1,27 @@
-"""The UAV's planner: proposals for the UGVs that the trigger has flagged."""
+"""The UAVs' planners: proposals for the UGVs that the trigger has flagged."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State, ValueProducer
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import ROBOTS, World
 from airground_drake.model.trigger.automaton import FIELDS, INTERVENING
 from airground_drake.sim.blocks.lifetime import weakly
 from airground_drake.sim.blocks.signals import Messages, components_of, declare_bodies, no_proposals
 from airground_drake.sim.blocks.ticks import Ticks
+from airground_drake.uav.channel import Transit
 from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
-from airground_drake.uav.messages import Report, sightings
+from airground_drake.uav.messages import Report, Reports, sightings
+from airground_drake.uav.outbox import answers_heard
 from airground_drake.uav.planner import Planner, PlannerState, sent_after
+from airground_drake.uav.policy import Proposal
 
 
 class _Ahead(list[PlannerState | None]):
@@ -30,14 +36,19 @@ class InterventionPlanner(LeafSystem):
 
     Ports (n UGVs, M bodies that move):
         in  `bodies` (3M) m; `status` (4n) from EventTrigger; `answers` (2n) and `reports`
-            (abstract), see `messages`.
+            (abstract), see `messages`. With several UAVs `proposals` of all of them (see `AllProposals`).
         out `proposals` abstract, n of Proposal or None.
+        With a channel `heard`, see `Uplink`, in place of answers and reports, and `sent`, the `PlannerState`, in place
+        of `proposals`.
     State: the last resting place of each UGV and since when, see `halts`; abstract, a `PlannerState`.
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
 
-    def __init__(self, planner: Planner, world: World, control_period: float) -> None:
+    def __init__(
+        self, planner: Planner, world: World, control_period: float, *, channel: bool = False, alone: bool = True
+    ) -> None:
         """Declare ports, state and the periodic update; the controllers' period is in s."""
+        # alone: whether there is one UAV.
         super().__init__()
         self._planner, self._world = planner, world
         n = len(planner.ugvs)
@@ -45,16 +56,24 @@ class InterventionPlanner(LeafSystem):
         self._robots = world.select(*ROBOTS)
         self._bodies = declare_bodies(self, world)
         self._status = self.DeclareVectorInputPort("status", FIELDS * n)
-        self._answers = self.DeclareVectorInputPort("answers", 2 * n)
-        self._reports = Messages(self, "reports", n, Report)
+        if channel:
+            self._heard = self.DeclareAbstractInputPort("heard", Value(Transit()))
+        else:
+            self._answers = self.DeclareVectorInputPort("answers", 2 * n)
+            self._reports = Messages(self, "reports", n, Report)
+        self._channel = channel
+        self._others = None if alone else Messages(self, "proposals", n, Proposal)
         held = self.DeclareAbstractState(Value(planner.start()))
         self._memory = int(held)
-        self.DeclareAbstractOutputPort(
-            "proposals",
-            lambda: no_proposals(n),
-            weakly(self._calc_proposals),
-            prerequisites_of_calc={self.abstract_state_ticket(held)},
-        )
+        remembers = {self.abstract_state_ticket(held)}
+        if channel:
+            self.DeclareAbstractOutputPort(
+                "sent", lambda: Value(planner.start()), weakly(self._calc_sent), prerequisites_of_calc=remembers
+            )
+        else:
+            self.DeclareAbstractOutputPort(
+                "proposals", lambda: no_proposals(n), weakly(self._calc_proposals), prerequisites_of_calc=remembers
+            )
         # Drake empties this slot of the Context when time, state or an input changes
         empty = ValueProducer(allocate=lambda: Value(_Ahead()), calc=lambda _, output: output.set_value(_Ahead()))
         self._ahead = self.DeclareCacheEntry("planned ahead", empty, {self.all_sources_ticket()}).cache_index()
@@ -85,6 +104,9 @@ class InterventionPlanner(LeafSystem):
     def _calc_proposals(self, context: Context, output: AbstractValue) -> None:
         output.set_value(self.memory(context).proposals)
 
+    def _calc_sent(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.memory(context))
+
     def _watch(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()
@@ -108,18 +130,52 @@ class InterventionPlanner(LeafSystem):
         # So a step-wise environment sees what the policies are asked. If it is called again, the last result counts.
         self.get_cache_entry(self._ahead).Eval(context)[:] = [self._planned(context)]
 
+    def _answered(self, context: Context) -> tuple[Array, Reports]:
+        """The UGVs' answers, (2n,), and reports, as the UAV has them."""
+        if not self._channel:
+            return self._answers.Eval(context), self._reports.Eval(context)
+        answers, reports = answers_heard(self._heard.Eval(context), range(len(self._planner.ugvs)))
+        return np.array(answers), reports
+
     def _planned(self, context: Context) -> PlannerState | None:
         """The memory after planning at the context's time; None at another time, or if nothing changes."""
         t = context.get_time()
         if not self._ticks.due(t):
             return None
         before = self.memory(context)
+        if t >= self._planner.lost_at - SAME_S:
+            return self._planner.lost(before, t)
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
         if t < self._planner.asleep_until(before, intervening):
             return None
         bodies = self._bodies.Eval(context).reshape(-1, 3)
-        answers, reports = self._answers.Eval(context), self._reports.Eval(context)
+        answers, reports = self._answered(context)
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         moving = sightings(self._world, t, bodies)
-        memory = self._planner.plan(before, t, bodies[self._robots], intervening, answers, reports, stands, moving)
+        others = () if self._others is None else self._others.Eval(context)
+        memory = self._planner.plan(
+            before, t, bodies[self._robots], intervening, answers, reports, stands, moving, others
+        )
         return sent_after(before, memory, t, self._planner.sender)
+
+
+class AllProposals(LeafSystem):
+    """What several UAVs ask of the UGVs, each of its own.
+
+    Ports (n UGVs): in `proposals_<uav>`, out `proposals`, abstract, n of Proposal or None.
+    """
+
+    def __init__(self, uavs: Sequence[str], count: int) -> None:
+        """Declare ports for some UAVs and so many UGVs."""
+        super().__init__()
+        self._of_uavs = [Messages(self, f"proposals_{uav}", count, Proposal) for uav in uavs]
+        self.DeclareAbstractOutputPort(
+            "proposals",
+            lambda: no_proposals(count),
+            weakly(self._calc),
+            prerequisites_of_calc={messages.port.ticket() for messages in self._of_uavs},
+        )
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        asked = zip(*(messages.Eval(context) for messages in self._of_uavs), strict=True)
+        output.set_value(tuple(next((one for one in of_ugv if one is not None), None) for of_ugv in asked))

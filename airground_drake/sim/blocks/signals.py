@@ -64,6 +64,19 @@ def no_reports(count: int) -> AbstractValue:
     return Value((Report(),) * count)
 
 
+def declare_inbox(
+    system: LeafSystem, count: int, state: set[Any], held: Any, outbox: Any, *, now: bool = False
+) -> InputPort:
+    """Declare the ports of UGVs on a channel: in `inbox`; out `proposals`, those they hold, and `outbox`."""
+    # now: whether what has just arrived is answered before the state is updated
+    inbox = system.DeclareAbstractInputPort("inbox", Value(()))
+    needs = {*state, inbox.ticket()}
+    system.DeclareAbstractOutputPort("proposals", lambda: no_proposals(count), held, prerequisites_of_calc=needs)
+    answered = needs if now else state
+    system.DeclareAbstractOutputPort("outbox", lambda: Value(()), outbox, prerequisites_of_calc=answered)
+    return inbox
+
+
 class Messages:
     """An input port for the messages of one kind to or from n UGVs."""
 

@@ -14,12 +14,13 @@ from scipy.stats import chi2_contingency
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.statuses import UNDECIDED
-from airground_drake.study.campaign.rows import JUDGED, TIMES, UNFINISHED, is_tested
+from airground_drake.study.campaign.rows import BOTH, DRAKE, JUDGED, TIMES, UNFINISHED, is_tested
 from airground_drake.study.campaign.statistics import CONFIDENCE, clopper_pearson, confidence_sequence
 
 WORST = 5  # runs of least margin that are listed for each claim
 BINS = 4  # parts of a key in maps of where a claim fails: quarters of its draws
 MOST_VALUES = 12  # most values of a key that is not a number, such as lists of policies, in these maps
+MOST_LISTED = 50  # runs that are listed at most; the dataset has them all
 UNRELATED = "seed"  # a key that explains no failure: neighbouring seeds of the noise have nothing in common
 BY_CHANCE = 0.05  # a map is shown if chance alone makes such differences with less than this probability
 QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
@@ -70,9 +71,10 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, depe
         "dependent": list(dependent),
         "draws": len(first),
         "ended": {str(name): int(count) for name, count in ended.value_counts().items()},
-        "not_judged": failed[["index", "run", "ended", "what"]].head(50).to_dict("records"),
+        "not_judged": failed[["index", "run", "ended", "what"]].head(MOST_LISTED).to_dict("records"),
         "runs": len(runs),
         "engines": {str(name): int(count) for name, count in runs["engine"].value_counts().items() if name},
+        "by_drake": runs.loc[runs["engine"].isin((DRAKE, BOTH)), ["index", "run"]].head(MOST_LISTED).to_dict("records"),
         "simulated_s": float(runs["duration_s"].sum()),
         "claims": sorted(
             (

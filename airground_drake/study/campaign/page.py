@@ -79,7 +79,7 @@ def made_by(engines: Mapping[str, int]) -> str:
     if loop:
         said.append(f"the compiled loop made {loop}, and Drake {compared} of them again, bit by bit the same")
     if screens:
-        others = "all others and Drake's were judged by their traces"
+        others = "the others were judged by their traces"
         said.append(f"array judges screened {screens} of them without a trace, which proves nothing; {others}")
     if clock:
         said.append(f"{clock} are not compared, because a policy met its limit of time by the clock")

@@ -12,11 +12,11 @@ from functools import partial
 from typing import Any
 
 # Lists and mappings whose entries may be left out.
-PARTS = (("intervention", "policies"), ("ugvs",), ("uav", "phantoms_m"), ("obstacles",))
+PARTS = (("intervention", "policies"), ("ugvs",), ("uav", "phantoms_m"), ("uavs",), ("obstacles",))
 SHARES = (0.25, 0.5, 0.75, 0.9)  # shares of the duration that may be left
 DIGITS = (0, 1, 2, 3)  # decimals that numbers are rounded to, the fewest first
 # Keys with numbers that are rounded.
-ROUNDED = ("ugvs", "obstacles", "arena_m", "uav", "control", "decision", "duration_s")
+ROUNDED = ("ugvs", "obstacles", "arena_m", "uav", "uavs", "control", "decision", "duration_s")
 
 Json = dict[str, Any]
 Fails = Callable[[Json], bool]  # whether a scenario is valid and fails, as before
@@ -55,13 +55,24 @@ def _without_entry(data: Json, path: tuple[str, ...]) -> Iterator[Json]:
         del _at(smaller, path)[key]
         for run in smaller["runs"].values():
             run["stalls_m"] = {ugv: place for ugv, place in run["stalls_m"].items() if ugv in smaller["ugvs"]}
+        _charge(smaller)
         yield smaller
 
 
+def _charge(data: Json) -> None:
+    """Put UGVs in the charge of the first of several UAVs if they are in that of none that is left."""
+    uavs = [*data.get("uavs", {}).values()]
+    for uav in uavs:
+        uav["ugvs"] = [ugv for ugv in uav["ugvs"] if ugv in data["ugvs"]]
+    charged = {ugv for uav in uavs for ugv in uav["ugvs"]}
+    for uav in uavs[:1]:
+        uav["ugvs"] += [ugv for ugv in data["ugvs"] if ugv not in charged]
+
+
 def _at(data: Any, path: tuple[str, ...]) -> Any:
-    """What is at a path of nested mappings."""
+    """What is at a path of nested mappings; nothing where it leads nowhere."""
     for key in path:
-        data = data[key]
+        data = data.get(key, {})
     return data
 
 
@@ -91,8 +102,8 @@ def _rounder(data: Json) -> Iterator[Json]:
     groups = [ROUNDED, *((key,) for key in ROUNDED)]
     for digits in DIGITS:
         for group in groups:
-            rounded = {key: _round(data[key], digits) for key in group}
-            if any(rounded[key] != data[key] for key in group):
+            rounded = {key: _round(data[key], digits) for key in group if key in data}
+            if any(rounded[key] != data[key] for key in rounded):
                 yield copy.deepcopy(data) | rounded
 
 

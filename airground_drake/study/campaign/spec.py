@@ -147,11 +147,12 @@ class Spec(File):
         overrides = dict(self.fixed)
         if self.course is not None:
             base = self._fixed_part
+            if base.uav is None:
+                raise ScenarioError(self.source, COURSE, Fault("the scenario has uavs"), "wanted: one UAV, in uav")
             distance = base.safe_distance
             rng = stream(self.seed, COURSE, index)
-            altitude_m = max(uav.altitude_m for uav in base.aerial.values())
             try:
-                overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m, altitude_m)
+                overrides |= self.course.values(rng, distance.obstacle_m, distance.ugv_m, base.uav.altitude_m)
             except ValueError as error:
                 raise ScenarioError(self.source, COURSE, Fault(str(error)), "wanted: a larger field") from None
         scenario = self._with(overrides | dict(values))

@@ -148,16 +148,18 @@ def _judged(scenario: Scenario, run: str, claims: Collection[str], index: int, e
     except LeftToDrakeError:
         trace = simulate(scenario, run)
         return _Judged(judge(trace, claims=claims or None), happened_in(trace), DRAKE)
+    # A policy's limit is in time by the clock, and need not fall at the same plan in Drake's run.
+    clock = any(OutOfTime.__name__ in asking.what for asking in made.memory.asked)
     screens = screened(loop, made, claims)
     chosen = _is_chosen(index, run)
     if screens and not chosen and not any(_is_failure(verdict) for verdict in screens):
-        return _Judged(screens, happened(loop, made), SCREENED)
+        return _Judged(screens, happened(loop, made), CLOCK if clock else SCREENED)
     trace = made.trace()
     verdicts = judge(trace, claims=claims or None)
     _agree(screens, verdicts, trace)
-    if chosen or any(_is_failure(verdict) for verdict in verdicts):
-        return _Judged(verdicts, happened_in(trace), _compared(trace, simulate(scenario, run)))
-    return _Judged(verdicts, happened_in(trace), BATCH)
+    compares = chosen or any(_is_failure(verdict) for verdict in verdicts)
+    made_by = CLOCK if clock else _compared(trace, simulate(scenario, run)) if compares else BATCH
+    return _Judged(verdicts, happened_in(trace), made_by)
 
 
 def _is_chosen(index: int, run: str) -> bool:
@@ -191,9 +193,8 @@ def _compared(trace: Trace, by_drake: Trace) -> str:
     """Who made a run, after a comparison bit by bit; raises EnginesDifferError."""
     from airground_drake.report.difference import first_difference  # slow to import, and rarely needed
 
-    both = trace.meta["faults"] + by_drake.meta["faults"]
-    if any(OutOfTime.__name__ in fault["what"] for fault in both):
-        return CLOCK  # a policy's limit is in time by the clock, and need not fall at the same plan
+    if any(OutOfTime.__name__ in fault["what"] for fault in by_drake.meta["faults"]):
+        return CLOCK
     if (difference := first_difference(by_drake, trace)) is not None:
         about, drakes, ours = difference
         told = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"

@@ -97,12 +97,13 @@ class Stage:
         self._begin: Callable[[int], Going | ByDrake]
         try:
             batch = Batch(scenario, run)
-            self._begin, self.database = batch.begin, batch.database
+            self._begin, self.databases = batch.begin, [batch.database]
         except LeftToDrakeError:
             recorder = Recorder(scenario, run)
-            (planner,) = recorder.model.planners.values()
-            self._begin, self.database = partial(ByDrake, recorder), planner.database
-        self.agent: Agent = next(policy for _, policy in self.database.policies if isinstance(policy, Agent))
+            self._begin = partial(ByDrake, recorder)
+            self.databases = [planner.database for planner in recorder.model.planners.values()]
+        policies = [policy for database in self.databases for _, policy in database.policies]
+        self.agents = [policy for policy in policies if isinstance(policy, Agent)]  # one per UAV
         self.targets = np.array([robot.target_m for robot in scenario.robots.values()])
         self.ugvs = tuple(scenario.ugvs)
         self.instant = Ticks(scenario.intervention.period_s, scenario.control.period_s).instant
@@ -196,10 +197,10 @@ class Episode:
 
     def _ask(self) -> None:
         """Let the planner plan for this instant, to find out what it asks for; the run does not change."""
-        agent = self.stage.agent
-        agent.chosen, agent.requests = self._chosen, {}
+        for agent in self.stage.agents:
+            agent.chosen, agent.requests = self._chosen, {}
         self._run.plan_ahead()
-        self._requests = agent.requests
+        self._requests = {ugv: seen for agent in self.stage.agents for ugv, seen in agent.requests.items()}
 
     def _advance(self) -> None:
         """Go to the next planning instant or to the end of the run."""
@@ -207,7 +208,8 @@ class Episode:
         self._instant += 1
         until = self.stage.instant(self._instant)
         until = self._end if until >= self._end * (1.0 - ROUNDING) else until
-        self.stage.agent.chosen = self._chosen
+        for agent in self.stage.agents:
+            agent.chosen = self._chosen
         try:
             self._run.advance(until)
         except LeftToDrakeError as error:
@@ -219,4 +221,5 @@ class Episode:
         self._settled_s = 0.0 if away.any() else self._settled_s + until - before
         self.ended = until >= self._end or self._settled_s >= SETTLED_S
         if self.ended:
-            self.stage.database.close()
+            for database in self.stage.databases:
+                database.close()

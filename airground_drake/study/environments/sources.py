@@ -19,7 +19,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.study.campaign.spec import Spec
 from airground_drake.study.environments.encoding import Encoding
-from airground_drake.study.environments.episode import Episode, Stage, with_agent
+from airground_drake.study.environments.episode import AGENT, Episode, Stage, with_agent
 
 DEFAULT = "minimal"
 MOST_STAGES = 64  # models that are kept; one takes about 0.5 MB
@@ -29,6 +29,7 @@ class Source:
     """Makes episodes by number: with a scenario the number is the seed of the noise, with a campaign that of the draw.
 
     Attributes:
+        is_alone: whether no policy beside the agent's is asked.
         ugvs: names of all UGVs that an episode may have.
         numbers: of the episodes that are drawn.
     """
@@ -49,6 +50,8 @@ class Source:
         self.numbers = range(MAX_SEED) if numbers is None else numbers
         first = self._given.draw(self.numbers[0]) if isinstance(self._given, Spec) else self._given
         self._run = _chosen(first, run)
+        policies = with_agent(first, self._run).intervention.policies
+        self.is_alone = [policy.name for policy in policies] == [AGENT]
         if isinstance(self._given, Spec):
             self._given = replace(self._given, runs=(self._run,))
         self.ugvs = tuple(first.ugvs)
@@ -115,6 +118,15 @@ class Episodes:
             if name not in ("_source", "encoding"):
                 setattr(copied, name, copy.deepcopy(value, memo))
         return copied
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether the agent of the environment is the only policy of its episodes."""
+        return self._source.is_alone
+
+    def beside(self) -> Self:
+        """Another environment that shares the models of this one; its episodes are its own."""
+        return copy.copy(self)
 
     def trace(self) -> Trace:
         """What the episode has recorded until now, for `judge`.

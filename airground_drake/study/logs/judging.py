@@ -8,7 +8,6 @@ it lacks e_k, the deficit below d obeys deficit <= (1 - A h) deficit + e_k, by t
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -29,6 +28,7 @@ from airground_drake.check.scenario import (
     pairs_of,
     places_of,
     robots_of,
+    uavs_of,
     written,
 )
 from airground_drake.check.shapes import Shape
@@ -204,13 +204,14 @@ def _both(
 
 
 def _pairs(scenario: Json, bodies: Mapping[str, Track]) -> list[Pair]:
-    """The pairs of bodies that are in the log; further UAVs are as the scenario's own one."""
-    pairs = pairs_of(scenario)
+    """The pairs of bodies that are in the log; further UAVs are as the scenario's first one."""
+    pairs, uavs = pairs_of(scenario), uavs_of(scenario)
+    first = next(iter(uavs.values()))
     for name in bodies:
         if name not in robots_of(scenario) and name not in scenario["obstacles"]:
-            alike = copy.deepcopy(scenario)
-            alike["uav"]["name"] = name
-            pairs += [pair for pair in pairs_of(alike) if name in (pair.robot, pair.other)]
+            known = uavs if scenario["safe_distance"].get("uav_m") else {}
+            pairs += [pair for pair in pairs_of(scenario | {"uavs": known | {name: first}}) if name in pair[:2]]
+            uavs = uavs | {name: first}
     movers = (name for name, obstacle in scenario["obstacles"].items() if obstacle["moves"])
     must_be = {*robots_of(scenario), *bodies, *movers}
     return [pair for pair in pairs if all(name in bodies or name not in must_be for name in (pair.robot, pair.other))]

@@ -152,7 +152,7 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     for uav in uavs_of(scenario):
         if uav not in streams and uav not in choice.without:
             said.append(f"{uav} is not in the log: its distances are not judged")
-    if choice.uavs:
+    if choice.uavs and not scenario["safe_distance"].get("uav_m"):
         said.append("distances between UAVs are not judged: the scenario promises none")
     for name in tracks:
         if plants := [plant["kind"] for plant in robots_of(scenario).get(name, {}).get("plant", ())]:

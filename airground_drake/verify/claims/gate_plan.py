@@ -32,7 +32,6 @@ from airground_drake.verify.runs.gate_record import (
     reasons_of,
 )
 from airground_drake.verify.runs.pairs import are_too_near
-from airground_drake.verify.runs.proposals import proposal_of
 from airground_drake.verify.runs.sum_up_rounding import compare_rounding, integrated_error_s, is_rounded
 
 SPEED_TOLERANCE = 1e-4  # a step may be longer than the speed limit allows by this, relative
@@ -45,8 +44,6 @@ WIDEST = 1e-5
 BLOCKS = 10  # all plans of at most so many choices are evaluated by exact distances, too
 # All plans of so many blocks can be evaluated along half-planes; they enclose the optimum of the route's problem.
 MOST_BLOCKS = 12
-# Reason of a refusal that follows from another UGV's refusal, and not from the UGV's own two outcomes.
-JOINT_REFUSED = "joint_refused"
 NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (26)"
 
 
@@ -86,10 +83,8 @@ class GatePlan(GateClaim):
         "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
         "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of at "
         "most half a stage. Under method (d) a plan is one of two choices for good: no decision chose to stop short of "
-        "the goal where the other choice would not, or would stop nearer to it. The exception is a UGV that refuses "
-        "its part of a joint plan because another UGV refuses its own: then the other refusal must be recorded. The "
-        "margin is no condition: it is the largest gap between the cost of a plan and the optimum of the half-plane "
-        "problem, where that is known."
+        "the goal where the other choice would not, or would stop nearer to it. The margin is no condition: it is the "
+        "largest gap between the cost of a plan and the optimum of the half-plane problem, where that is known."
     )
     latex = (
         r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "
@@ -189,7 +184,7 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
     """(26b)-(26e), (25) and what was recorded about the plan."""
     limit = trace.scenario.ugvs[row.robot].max_speed_m_s
     period = trace.scenario.control.period_s
-    begins = row["initial_m"] - interpolate(trace.t, trace.position(row.robot), row.t_s)
+    begins = row["initial_m"] - _seen_at(trace, row)
     yield Deviation(row, "initial position, m", begins, POSITION_TOLERANCE_M)
     refusing, accepting = row.constant
     clear_refusing, clear_accepting = (_clear(trace, row, way, period) for way in (refusing, accepting))
@@ -228,6 +223,15 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
         yield Deviation(row, f"{name}: faster than the speed limit", np.maximum(0.0, over), SPEED_TOLERANCE)
 
 
+def _seen_at(trace: Trace, row: DecisionRecord) -> Array:
+    """Where a UGV saw itself when it decided, (3,), m."""
+    if trace.scenario.sensing is None:
+        return interpolate(trace.t, trace.position(row.robot), row.t_s)
+    sample = int(np.searchsorted(trace.sampled("t_s"), row.t_s - TIME_TOLERANCE_S))
+    seen: Array = trace.as_seen(row.robot, row.robot)[sample]
+    return seen
+
+
 def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -> npt.NDArray[np.bool_]:
     """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding."""
     # Neither the points of the problem nor the barriers themselves may be so near: of a wall the problem has but
@@ -242,15 +246,9 @@ def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -
 
 
 def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
-    """Method (d): the choice of every decision for which both outcomes were predicted, and that was the UGV's own."""
-    own = [row for row in rows if row.given["reason"] != JOINT_REFUSED]
-    looked = [row for row in own if row.given["accept_stalls"] >= 0.0]
+    """Method (d): the choice of every decision for which both outcomes were predicted."""
+    looked = [row for row in rows if row.given["accept_stalls"] >= 0.0]
     compared = [deviation for row in looked for deviation in _compare_choice(trace, row)]
-    refused = {_part(trace, row) for row in own if row.given["decision"] == "refuse"}
-    for row in rows:
-        if row.given["reason"] == JOINT_REFUSED:
-            alone = row.given["decision"] != "refuse" or _part(trace, row) not in refused
-            compared.append(Deviation(row, "no other UGV refuses its part of the joint plan", float(alone), 0.0))
     gaps = [_above_the_other(row) for row in looked]
     evidence = Choices(
         decisions=len(rows),
@@ -262,12 +260,6 @@ def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
         largest_gap_to_enumeration=max(gaps, default=None),
     )
     return conclude(Finding("holds", evidence=asdict(evidence), exercised=len(looked)), compared)
-
-
-def _part(trace: Trace, row: DecisionRecord) -> tuple[float, float, Sequence[str]]:
-    """When a decision was made, s, and the joint plan that it is about: when it was sent, s, and its parties."""
-    on = proposal_of(trace, row.number)
-    return row.t_s, on.issued_s, on.party or (on.ugv,)
 
 
 def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:

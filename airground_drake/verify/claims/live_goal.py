@@ -108,8 +108,10 @@ def conditions(
         yield Condition({"robot": ugv, "condition": "short of its target", "margin_m": away - arrival})
     for name, uav in scenario.aerial.items():
         if stalls:
-            over = last.mean(axis=0) + np.array([0.0, 0.0, uav.altitude_m])
-            yield _within(ways, name, "over the centroid of the UGVs", over, arrival)
+            own = [ugv in scenario.in_charge(name) for ugv in scenario.ugvs]
+            over = last[own].mean(axis=0) + np.array([0.0, 0.0, uav.altitude_m])
+            whose = "the UGVs" if all(own) else "its UGVs"
+            yield _within(ways, name, f"over the centroid of {whose}", over, arrival)
         else:
             yield _within(ways, name, "at its target", uav.target_m, arrival)
 

@@ -24,7 +24,8 @@ class LiveWait(TheoremClaim):
     summary = "No UAV can keep a UGV from its own task for ever."
     statement = (
         "Under method (d) no UAV keeps a UGV from its own task for longer than a bound, whatever it proposes, "
-        "withdraws, says of its map or names as its cause: after so long the UGV is on its own until it has rested."
+        "withdraws, says of its map or names as its cause, and whatever a channel does to its messages: after so long "
+        "the UGV is on its own until it has rested."
     )
     latex: tuple[str, ...] = (
         r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h), \quad N \text{ tries}, \; "

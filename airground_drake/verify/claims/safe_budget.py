@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from airground_drake.base.exact import decimal
-from airground_drake.model.plants.budget import AT_REST, kept_distance
+from airground_drake.model.plants.budget import AT_REST, kept_distance, least_gain
 from airground_drake.model.plants.plant import Plant
 from airground_drake.scenario.budget import alike, budget, takes_room
 from airground_drake.scenario.plants import made
@@ -19,6 +19,7 @@ from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 ROUNDED_M = 1e-12  # by so much rounding may make a distance of the law too small, m
 BASIC = ("Budget.at_samples", "Budget.budget_always")
 # Those about a robot beside an obstacle that may move; a plant adds its own.
+OF_ERRORS = ("Budget.measured_start", "Budget.one_stands", "Budget.smaller_gain", "Mixed.entry_keeps")
 BESIDE_MOVING = ("Passive.own_doing", "Passive.kept")
 
 
@@ -26,15 +27,18 @@ class SafeBudget(TheoremClaim):
     """SAFE-BUDGET."""
 
     id = "SAFE-BUDGET"
-    subject = "distance for lag and delay"
+    subject = "distance budget"
     summary = (
-        "The law keeps the safe distance plus what turning, lags and delays cost, so bodies keep the safe distance."
+        "The law keeps the safe distance plus what turning, lags, delays and errors of measured positions cost, so "
+        "bodies keep the safe distance."
     )
     statement = (
         "Where the points that the law steers keep the law's distance d_law at the samples, the bodies of robots that "
         "turn, lag, get their commands late or have a plant of the user's own keep the safe distance d at all times, "
         "from a start at which they have it. Beside an obstacle that appears later, that is where a body that lags or "
-        "gets its commands late, and its way under commands already given, are clear (SAFE-HYP). "
+        "gets its commands late, and its way under commands already given, are clear (SAFE-HYP). So do the bodies of "
+        "robots that act on measured positions with bounded errors, as each inequality is met as measured, or both of "
+        "a pair stand. "
         "Beside an obstacle that may move, the bodies keep in the same way what SAFE-OWN states. For each kind of pair "
         "d_law is at least what the theorems ask for."
     )
@@ -44,6 +48,9 @@ class SafeBudget(TheoremClaim):
         r"c = l, \quad f = \tfrac{1}{8} |\omega| \lVert v \rVert h^2 \text{ (unicycle, chord steering)}; \quad c, w "
         r"\text{ as declared (the user's own)}",
         r"b + c = \sqrt{d^2 + l^2} \text{ beside a set at rest (never backwards)}",
+        r"e \text{ (errors of measured positions)}: \; d_{\mathrm{law}} \ge e + \sqrt{m^2 + e^2} + \sum_i w_i / A', "
+        r"\quad m = b + \sum_i (c_i + f_i), \quad e (1 - A' h) \le A' h \sqrt{m^2 + e^2}, \quad A' = A / 2 "
+        r"\text{ (two robots)}",
     )
     method = (
         "Theorems in Coq about each kind of plant. Their hypotheses on the numbers of the scenario are checked here; "
@@ -55,6 +62,8 @@ class SafeBudget(TheoremClaim):
         "The plants of the scenario are those of the robots: no slip, no error of a heading, time constant or delay. "
         "The user's own plants drift and cover no more than they declare (SAFE-HYP measures both in the run).",
         "Commands stay within the speed limits (SAFE-HYP checks the run).",
+        "Measured positions are no farther off than declared, and all robots act on the same ones (SAFE-HYP checks "
+        "both in the run).",
         "A delay comes before a lag. Between a robot with either and a unicycle, what both cost is added up.",
     )
     does_not_establish = (
@@ -65,7 +74,7 @@ class SafeBudget(TheoremClaim):
     margin_of = "distance in the law less what the plants take"
 
     def applies(self, scenario: Scenario) -> bool:
-        """Only a scenario with robots that are not where the law steers them."""
+        """Only a scenario with robots that are not where the law steers or sees them."""
         return takes_room(scenario)
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
@@ -78,6 +87,7 @@ class SafeBudget(TheoremClaim):
                 name: {"plant": [asdict(keys) for keys in robot.plant], "max_speed_m_s": robot.max_speed_m_s}
                 for name, robot in robots.items()
             },
+            **({"position_error_m": scenario.position_error_m} if scenario.position_error_m else {}),
             "pairs": [
                 {
                     "first": pair.first, "second": pair.second, "kind": pair.kind, "law_m": pair.law_m,
@@ -94,6 +104,7 @@ class SafeBudget(TheoremClaim):
         named = [*BASIC, *(name for plant in plants for name in plant.theorems)]
         if moving:
             named += [*BESIDE_MOVING, *(name for plant in plants for name in plant.passive_theorems)]
+        named += OF_ERRORS if "position_error_m" in inputs else ()
         claim = SafeBudget()
         claim.theorems = (*dict.fromkeys(named),)
         return TheoremClaim.check(claim, inputs)
@@ -109,7 +120,10 @@ class SafeBudget(TheoremClaim):
         return [*stable(gain, h), *needs, *self._pairs(inputs)]
 
     def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
-        bounds = {name: plant.bounds(speed) for name, (plant, speed) in _plants(inputs).items()}
+        error_m, share = inputs.get("position_error_m", 0.0), _share(inputs)
+        bounds = {
+            name: plant.bounds(speed)._replace(error_m=error_m) for name, (plant, speed) in _plants(inputs).items()
+        }
         for pair in inputs["pairs"]:
             both = (bounds[pair["first"]], bounds.get(pair["second"], AT_REST))
             passive = pair["kind"] == "moving"
@@ -121,6 +135,15 @@ class SafeBudget(TheoremClaim):
             margin = max(kept, 0.0) - pair["safe_m"]
             holds = margin * pair["safe_m"] >= -ROUNDED_M * pair["law_m"]  # rounding in the law, seen in what is kept
             yield Hypothesis(self.margin_of, says, margin, "m", holds)
+            if error_m:
+                least = least_gain(pair["safe_m"], *both)
+                says = f"{pair['first']}, {pair['second']}: A h = {share:.6g} bears the errors, at least {least:.6g}"
+                yield Hypothesis("A h less what errors ask for", says, share - least, "1", share >= least)
+
+
+def _share(inputs: dict[str, Any]) -> float:
+    """A h."""
+    return float(decimal(inputs["avoidance_gain_1_s"]) * decimal(inputs["period_s"]))
 
 
 def _plants(inputs: dict[str, Any]) -> dict[str, tuple[Plant, float]]:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.exact import decimal
-from airground_drake.model.plants.budget import AT_REST, kept_distance
+from airground_drake.model.plants.budget import AT_REST, kept_distance, part_of_gain
 from airground_drake.model.plants.plant import Premise, Recorded
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
@@ -54,6 +54,7 @@ PASSIVE = "avoidance beside an obstacle that may move"  # the hypothesis that th
 DECLARED = "declared speed"  # the hypothesis that an obstacle moved no faster than it was expected to
 # The hypotheses that a pair begins apart: the points that the law steers, and the bodies that lag or come late.
 START, BODIES = "safe start", "safe start of the bodies"
+MEASURED = "error of the measured position"  # the hypothesis that robots are no farther from where they are seen
 BUILT = "controller parameters"  # the hypothesis that the controllers were built with what the scenario demands
 
 
@@ -126,7 +127,8 @@ class SafeHyp(TraceClaim):
         "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run. Beside an obstacle that "
         "may move the passive law held, and it moved no faster than declared: so d was kept in every period that "
         "began at d + V h or more. The controllers were built with what the scenario says; one of the user's own is "
-        "judged by its steps alone."
+        "judged by its steps alone. Where robots act on measured positions, the inequalities are those of the pair as "
+        "measured, errors were within their bound, and d is that of the true bodies."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -148,7 +150,8 @@ class SafeHyp(TraceClaim):
         "inside a polygon the normal of its nearest edge. A barrier of several parts has an inequality for each of "
         "them, and keeps what all of them keep. The distances promised are listed less the radii. The parameters of "
         "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
-        "apart count as one instant."
+        "apart count as one instant. With errors of positions D and n are those of measured ones and steps are true: a "
+        "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
@@ -159,6 +162,7 @@ class SafeHyp(TraceClaim):
         "time on, and the safe start is that D >= d at that sample. The bodies of robots that lag, get their commands "
         "late or never drive backwards must be clear then, too, and so must their ways under commands already given, "
         "for the time of the delay. If they are not, nothing is promised for the pair.",
+        "All robots act on the same measured positions, those that are recorded.",
         "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",
     )
     does_not_establish = (
@@ -279,7 +283,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     samples, last = period_ends(trace), last_period(trace)
     places = {name: trace.position(name)[samples] for name in trace.robots}
     longest = {name: _longest(way, float(last)) for name, way in places.items()}
-    pairs, gain, bounds = pairs_of(trace), _gain(trace), bounds_of(trace)
+    pairs, of_law, bounds = pairs_of(trace), _gain(trace), bounds_of(trace)
     reach = np.array([pair.law_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
     beyond = SCREEN_M + np.array([pair.cover_m for pair in pairs])  # of the bodies from the points that are steered
     for k in np.flatnonzero(apart_of(trace) <= reach + beyond).tolist():
@@ -291,24 +295,47 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         there, planar = slice(begin, end), is_planar(trace, pair.first)
         first = places[pair.first][there]
         beside = _beside(trace, pair, places, there, float(reach[k]))
+        both = bounds[pair.first], bounds.get(pair.second, AT_REST)
+        gain = of_law * Fraction(part_of_gain(*both))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
-        missed = [shortfalls(first, place, pair.law_m, *asked, core, planar=planar) for place, core in beside]
+        missed = [
+            shortfalls(first, place, pair.law_m, *asked, core, planar=planar, seen=_seen(trace, pair, place, there))
+            for place, core in beside
+        ]
         begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.law_m, core, planar=planar) for place, core in beside]
         most = np.max([np.zeros(len(first) - 1), *missed], axis=0)
         e, short = Fraction(float(most.max())), max(begun, default=Fraction(0))
         lost = max(e / gain - Fraction(pair.drift_m), short) if gain else (len(samples) - 1) * e + short
         missed_m = np.concatenate([np.zeros(begin), most, np.zeros(len(samples) - end)])
         gap, why = -rounded_up(lost - Fraction(pair.required_m)), ""
-        if pair.under_way_s is not None:
+        if pair.under_way_s is not None or pair.error_m:
             start = start_margin(trace, pair)
             if not start >= -DISTANCE_TOLERANCE_M:
                 gap, why = -inf, f"{BODIES} missed by {-start:.3g} m"
+            elif pair.error_m and not _bears_errors(pair, gain, lost):
+                gap, why = -inf, "the steered points came too near for errors of measured positions"
             elif lost > 0:  # it comes off what the points keep, from which follows what the bodies keep
-                both = bounds[pair.first], bounds.get(pair.second, AT_REST)
                 points = nextafter(pair.law_m - rounded_up(lost), -inf)
                 kept = kept_distance(points, *both, gain=trace.scenario.control.avoidance_gain_1_s) - pair.radii_m
                 gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
         yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
+
+
+def _seen(trace: Trace, pair: Pair, place: Array, there: slice) -> tuple[Array, Array] | None:
+    """Measured places of a pair at the samples, (K, 3), m, each, if robots act on these; None if not."""
+    if not pair.error_m:
+        return None
+    samples = slice(there.start, there.stop - 1)
+    own = trace.as_seen(pair.first, pair.first)[samples]
+    other = trace.as_seen(pair.first, pair.second)[samples] if pair.second in trace.robots else None
+    return own, np.broadcast_to(place, own.shape) if other is None else other
+
+
+def _bears_errors(pair: Pair, gain: Fraction, lost: Fraction) -> bool:
+    """Whether err (1 - A h) <= A h kept, where the points keep d_law - err less what is lost, drifts included."""
+    error = Fraction(pair.error_m)
+    kept = Fraction(pair.law_m) - error - Fraction(pair.drift_m) - lost
+    return error < kept and error * (1 - gain) <= gain * kept
 
 
 def _beside(
@@ -335,9 +362,10 @@ def _longest(places: Array, last: float) -> float:
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
     """The distance that is lost, m, because a sample misses the inequalities."""
-    t, gain = trace.sampled("t_s"), float(_gain(trace))
+    t, bounds = trace.sampled("t_s"), bounds_of(trace)
     for promised in kept:
         pair, missed_m = promised.pair, promised.missed_m
+        gain = float(_gain(trace)) * part_of_gain(bounds[pair.first], bounds.get(pair.second, AT_REST))
         lost = np.maximum(missed_m / gain - pair.drift_m, 0.0) if gain else missed_m * len(t)
         about = {"first": pair.first, "second": pair.second}
         yield _Hypothesis(AVOIDANCE, "m", t, 0.0 - lost, DISTANCE_TOLERANCE_M, about)
@@ -361,11 +389,12 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     """How many avoidance inequalities were in range of a robot, and how many bound a command, by who avoided whom."""
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
+    count |= {"uav beside uav": 0} if len(trace.uavs) > 1 else {}
     kind_of = trace.scenario.kind_of
     beside = ["obstacle" for _ in parts_of(trace).owner] + [kind_of(robot) for robot in trace.robots]
     in_range = 0
     for robot in trace.robots:
-        given = inequalities_of(trace, robot)
+        given = inequalities_of(trace, robot, as_seen=trace.scenario.sensing is not None)
         in_range += len(given.bound)
         for column in given.column[given.slack(trace.chosen(robot)) <= BINDING_M_S].tolist():
             count[f"{kind_of(robot)} beside {beside[column]}"] += 1
@@ -399,7 +428,9 @@ def _static(trace: Trace) -> Iterator[_Hypothesis]:
         for name, margins in ((START, excess), (BODIES, of_bodies)):
             if np.isfinite(margins).any():
                 yield _Hypothesis(name, "m", start, margins, DISTANCE_TOLERANCE_M, about, others)
-        left = [room(pair.law_m, limit[robot], limit.get(pair.second, pair.speed_m_s)) for pair in beside]
+        left = [
+            room(pair.law_m, limit[robot], limit.get(pair.second, pair.speed_m_s)) - pair.error_m for pair in beside
+        ]
         yield _Hypothesis("sensing range", "m", start, np.array(left), 0.0, about, others)
 
 
@@ -419,8 +450,24 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
             yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
         spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
+        if trace.scenario.sensing:
+            left = error_margins(trace, robot)
+            yield _Hypothesis(MEASURED, "m", trace.sampled("t_s"), left, 0.0, about)
         if robot in trace.ugvs:
             yield _Hypothesis("planar motion", "m", t, 0.0 - np.abs(place[:, 2] - place[0, 2]), 0.0, about)
+
+
+def error_margins(trace: Trace, robot: str) -> Array:
+    """By how much the errors of a robot's measured positions are below their bound, (S,), m; exact in their signs."""
+    most = decimal(trace.scenario.position_error_m)
+    seen, true = trace.as_seen(robot, robot).tolist(), trace.position(robot)[trace.sample_rows].tolist()
+    margins = list[float]()
+    for measured, place in zip(seen, true, strict=True):
+        squared = sum((Fraction(a) - Fraction(b)) ** 2 for a, b in zip(measured, place, strict=True))
+        margins.append(float(most) - float(squared) ** 0.5)
+        if (squared <= most**2) != (margins[-1] >= 0.0):
+            margins[-1] = 0.0 if squared <= most**2 else -nextafter(0.0, 1.0)
+    return np.array(margins)
 
 
 @dataclass(frozen=True)

@@ -282,3 +282,11 @@ Proof. intros Q Ha Hb; replace q with (1 - q') in Ha by lra; lra. Qed.
 (** What meets the law with some gain meets it with a smaller one: a pair takes the smaller one of its two. *)
 Lemma smaller_gain h A A' d D : A' <= A -> bound h A' d D <= bound h A d D.
 Proof. intros HA; unfold bound; destruct (Rle_dec D d); [apply Rmult_le_compat_r; lra | lra]. Qed.
+
+(** One of two robots stands; the other one does its half with the gain [A]: together they meet the law with [A / 2].
+    So does a pair of which both do their halves ([smaller_gain]). *)
+Lemma one_stands h A d D b : 0 < h -> bound h A d D / 2 <= b -> bound h (A / 2) d D <= b.
+Proof.
+  intros Hh M; apply Rle_trans with (2 := M); unfold bound; destruct (Rle_dec D d) as [| out]; [lra |].
+  assert (I : 0 < / h) by (apply Rinv_0_lt_compat; lra); unfold Rdiv; nra.
+Qed.

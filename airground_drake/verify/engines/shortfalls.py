@@ -8,7 +8,14 @@ a polygon, the normal of the nearest edge. The theorem `budget` (coq/Budget.v) a
     n.step_1 >= q_1 b - e_1 and -n.step_2 >= q_2 b - e_2,    b = a (d - D) where D <= d, else d - D,    q_1 + q_2 = 1,
 
 or the two are far: D >= d + ||step_1|| + ||step_2||. If e_1 + e_2 <= e at every sample, then D >= d - e / a at all
-times, where that is above 0. Positions and corners are doubles, which are rational numbers, and so is the nearest point
+times, where that is above 0.
+
+Where robots act on measured positions, D and n are of these, the steps and "far" are of true ones, and the pair meets
+the law together, with the gain a of the pair (a half of the law's beside a robot), or both bodies stand:
+
+    n.step_1 - n.step_2 >= b - e.
+
+Positions and corners are doubles, which are rational numbers, and so is the nearest point
 of a core: only square roots are enclosed.
 """
 
@@ -41,7 +48,7 @@ def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
 
 def shortfalls(
     first: Array, second: Array, d: float, share: Fraction, gain: Fraction, last: Fraction,
-    core: Cores = POINT, *, planar: bool = False, held: bool = False,
+    core: Cores = POINT, *, planar: bool = False, held: bool = False, seen: tuple[Array, Array] | None = None,
 ) -> Array:  # fmt: skip
     """What a pair misses at each sample, e_1 + e_2, rounded up: (K,), m per control period."""
     # With a body that may move with V, the first one alone keeps the passive law: share 1, gain 0, d + V h in place of
@@ -50,12 +57,15 @@ def shortfalls(
     # first, second: (K + 1, 3), m
     # gain: a.
     # planar: whether the first body stays in its plane: then no way leads out of a core through its top.
+    # seen: measured places of both, (K, 3), m, if robots act on these.
     other = np.broadcast_to(second, first.shape)
     missed = np.zeros(len(first) - 1)
     pair = _Pair(core, planar, Fraction(d), share, gain, held)
-    for k in _doubtful(first, other, pair, float(last)).tolist():
+    for k in (_doubtful if seen is None else _near)(first, other, pair, float(last)).tolist():
         ends = np.stack([first[k], first[k + 1], other[k], other[k] if held else other[k + 1]])
-        missed[k] = rounded_up(_shortfall(ends, pair, last if k == len(missed) - 1 else Fraction(1)))
+        lasts = last if k == len(missed) - 1 else Fraction(1)
+        of_step = _shortfall(ends, pair, lasts) if seen is None else _shortfall_seen(ends, seen, k, pair, lasts)
+        missed[k] = rounded_up(of_step)
     return missed
 
 
@@ -91,6 +101,40 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArr
         if part > 0.0:  # nothing is asked of an obstacle
             met &= sign * np.einsum("ka,ka->k", normal, step) - part * bound > SCREEN_M
     return np.flatnonzero((distance - d - reach <= SCREEN_M) & ~met)
+
+
+def _near(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArray[np.intp]:
+    """Samples at which a pair is not far: their numbers."""
+    distance, _ = away_from(pair.core, (first - other)[:-1], planar=pair.planar)
+    reach = np.zeros(len(distance))
+    for body in (first, other):
+        step = np.diff(body, axis=0)
+        step[-1] /= last
+        reach += np.linalg.norm(step, axis=1)
+    return np.flatnonzero(distance - float(pair.d) - reach <= SCREEN_M)
+
+
+def _shortfall_seen(ends: Array, seen: tuple[Array, Array], k: int, pair: _Pair, lasts: Fraction) -> Fraction:
+    """e of sample k, at which the law acted on measured places (K, 3), m, from above; `ends` (4, 3), m."""
+    places = np.concatenate([ends, [seen[0][k], seen[1][k]]])
+    (here, after, there, beyond, own, other), shape, unit = _in_units(places, pair.core)
+    steps = (_minus(after, here), _minus(beyond, there))
+    if not any(map(any, steps)):  # both stand
+        return Fraction(0)
+    reach = sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
+    if _apart(_ways_off(shape, _minus(here, there), pair.planar, unit)) >= pair.d + reach:
+        return Fraction(0)
+    ways = _ways_off(shape, _minus(own, other), pair.planar, unit)
+    if not ways:
+        return pair.gain * pair.d + reach
+    apart = _apart(ways)
+    bound = demanded(pair.d - apart, pair.gain, Fraction(1))
+    totals = list[Fraction]()
+    for way in ways:
+        along = Fraction(_dot(way.normal, _minus(*steps)), unit) / lasts
+        least = min(along / length for length in _length(way.normal, 1))
+        totals.append(apart - way.apart + max(bound - least, Fraction(0)))
+    return min(totals)
 
 
 def _shortfall(ends: Array, pair: _Pair, lasts: Fraction) -> Fraction:

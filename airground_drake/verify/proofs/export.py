@@ -155,6 +155,7 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
 # Keys of bodies that theorems take into account, or need not.
 COVERED = frozenset(
     {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
+    | {"ugvs", "lost_at_s"}
     | {"position_m", "known_to_uav", *SHAPES, "heading_rad", "height_m", "distance_m"}
     | {"moves", "known_motion", "cells", "plant"}
 )

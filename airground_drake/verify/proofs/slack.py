@@ -14,6 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from airground_drake.model.plants.budget import Bounds, law_distance
+from airground_drake.scenario.plants import bounds_of
 from airground_drake.sim.trace import Trace
 
 # A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
@@ -53,7 +54,8 @@ def is_late(trace: Trace, robot: str) -> bool:
 def law_m(trace: Trace, distance_m: Fraction, first: str, second: str) -> Fraction:
     """The distance that the law keeps between two steered points, or one and a set at rest, m."""
     robots, control = trace.scenario.robots, trace.scenario.control
-    both = [trace.plant(name).bounds(robots[name].max_speed_m_s) for name in (first, second) if name in robots]
+    about = control.period_s, trace.scenario.position_error_m
+    both = [bounds_of(robots[name], *about) for name in (first, second) if name in robots]
     if all(plant.exact for plant in both):
         return distance_m
     return Fraction(float(law_distance(float(distance_m), *both, gain=control.avoidance_gain_1_s)))

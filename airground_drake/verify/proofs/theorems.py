@@ -129,13 +129,18 @@ _ALL = (
         "Anything about sets that turn, or about a pair from a period on in which it misses the law by more than W.",
     ),
     Theorem(
-        "Budget.measured_start", "ours", ("SAFE-HYP",),
+        "Budget.measured_start", "ours", ("SAFE-HYP", "SAFE-BUDGET"),
         "A pair that is measured to be at d_law at the start has the distance from which the budget begins.",
         ("Its relative position is measured with an error of eps at most.",),
     ),
     Theorem(
         "Budget.smaller_gain", "ours", ("SAFE-HYP",),
         "What meets the law with a gain meets it with a smaller one.",
+        ("The period is positive.",),
+    ),
+    Theorem(
+        "Budget.one_stands", "ours", ("SAFE-HYP", "SAFE-BUDGET"),
+        "Where one of two robots stands and the other does its half with a gain, they meet the law with half of it.",
         ("The period is positive.",),
     ),
     Theorem(

@@ -24,7 +24,6 @@ from airground_drake.verify.engines.outlines import (
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.pairs import carried, declared_pairs, pairs_beside, parts_of
 
-CONTROLLERS = ("ugv_controller", "uav_controller")
 NO_INTERVENTION = "a"  # method without interventions
 # Parameters that are outlines: of what is at rest, and of what moves, about its origin.
 OUTLINES = ("outlines", "moving_outlines")
@@ -62,7 +61,11 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     carrier = np.concatenate([everybody, len(robots) + bodies])
     with_uav = np.array([scenario.kind_of(name) == "uav" for name in robots])
     wanted = {}
-    for name, team in zip(CONTROLLERS, (everybody[~with_uav], everybody[with_uav]), strict=True):
+    uavs = everybody[with_uav]
+    controllers = {"ugv_controller": everybody[~with_uav]}
+    for i in uavs.tolist():
+        controllers["uav_controller" if len(uavs) == 1 else f"uav_controller_{robots[i]}"] = uavs[uavs == i]
+    for name, team in controllers.items():
         beside = np.array([np.delete(np.arange(len(column)), m + i) for i in team])
         wanted[name] = {
             "members": team,
@@ -77,6 +80,8 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             "period_s": control.period_s,
             "sensing_range_m": control.sensing_range_m,
         }
+        if scenario.position_error_m:
+            wanted[name]["stands"] = True
         if len(moving):
             wanted[name]["moving_outlines"] = that_move
     if own := scenario.ugv_controller:  # it is judged by its steps, whatever it was built with

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
+from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance, part_of_gain
 from airground_drake.scenario.schema import MAP, Obstacle, Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace, per_trace
@@ -67,6 +67,7 @@ class Pair(NamedTuple):
     # miss of their commands included.
     cover_m: float = 0.0
     drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
+    error_m: float = 0.0  # sum of the bounds of the errors of the measured positions
     slip_m: float = 0.0  # how much of its command the robot may miss in a control period
     # How far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
     drawn_m: float = 0.0
@@ -132,13 +133,15 @@ def pairs_by(
         reach = (own.speed_m_s + (speed or other.speed_m_s)) * period
         row, last = there.get(second, (0, end))
         safe = given.required_m + sum(given.radii_m)
+        part = part_of_gain(own, other)
         drawn = own.cover_m if own.drawn and second in there and not passive else 0.0
         needs_start = drawn or (not passive and (own.late or other.late))
         yield Pair(
             first, second, given.required_m, sum(given.radii_m), share, reach, row, last, speed,
             more_m=float(law_distance(safe, own, other, gain=gain, passive=passive)) - safe,
             cover_m=sum(plant.rolling_m + plant.drift_m_s * period for plant in (own, other)),
-            drift_m=sum(plant.drift_m_s / gain for plant in (own, other) if plant.drift_m_s),
+            drift_m=sum(plant.drift_m_s / (gain * part) for plant in (own, other) if plant.drift_m_s),
+            error_m=own.error_m + other.error_m,
             slip_m=own.drift_m_s * period,
             drawn_m=drawn,
             under_way_s=max(own.delay_s, other.delay_s) if needs_start else None,
@@ -149,7 +152,8 @@ def pairs_by(
 def bounds_of(trace: Trace) -> dict[str, Bounds]:
     """How far the bodies of the robots may be from where the law steers them, by name."""
     robots = trace.scenario.robots
-    return {name: trace.plant(name).bounds(robots[name].max_speed_m_s) for name in robots}
+    error_m = trace.scenario.position_error_m
+    return {name: trace.plant(name).bounds(robots[name].max_speed_m_s)._replace(error_m=error_m) for name in robots}
 
 
 class Parts(NamedTuple):

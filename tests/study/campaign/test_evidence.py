@@ -13,7 +13,19 @@ from airground_drake.base.errors import UnknownNameError
 from airground_drake.commands.campaign import _code, _summary
 from airground_drake.study.campaign.evidence import evidence
 from airground_drake.study.campaign.page import page, told
-from airground_drake.study.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED, Row, blank
+from airground_drake.study.campaign.rows import (
+    BATCH,
+    BOTH,
+    CLOCK,
+    COLUMNS,
+    DRAKE,
+    INVALID,
+    JUDGED,
+    SCREENED,
+    STOPPED,
+    Row,
+    blank,
+)  # fmt: skip
 from airground_drake.study.campaign.statistics import clopper_pearson, confidence_sequence
 from airground_drake.study.campaign.stopping import InOrder, Stopping
 from airground_drake.study.campaign.work import died
@@ -166,6 +178,19 @@ def test_the_page_says_first_what_was_found_and_what_separates_failures() -> Non
     assert "SAFE-TRACE in run d fails in 20 of 20 runs with gain 1, and in 0 of 20 runs with gain" in text
     assert text.index("refuted in 20 of") < text.index("What separates failures") < text.index("How likely a violation")
     assert not re.search(r'<script|<img|<b>|(?:src|href)="(?!#)', text)
+
+
+def test_it_says_who_made_and_judged_the_runs() -> None:
+    made_by = [SCREENED, SCREENED, BATCH, BOTH, DRAKE, CLOCK]
+    found = conclude([row(index, engine=engine) for index, engine in enumerate(made_by)])
+    assert found["engines"] == {**dict.fromkeys(made_by, 1), SCREENED: 2}
+    assert [entry["index"] for entry in found["by_drake"]] == [3, 4]
+    for said in (
+        "Drake made 1 of these runs; the compiled loop made 5, and Drake 1 of them again, bit by bit the same;",
+        "array judges screened 2 of them without a trace, which proves nothing; the others were judged by their traces",
+        "1 are not compared, because a policy met its limit of time by the clock.",
+    ):
+        assert said in shown(found)
 
 
 def test_without_independent_draws_there_is_no_interval() -> None:

@@ -89,6 +89,21 @@ def test_what_does_not_matter_goes() -> None:
     assert round(small["obstacles"][matters]["position_m"][0], 1) == small["obstacles"][matters]["position_m"][0]
 
 
+def test_of_several_uavs_one_is_left_in_charge_of_whom_it_takes() -> None:
+    data = resolved(load("two_uavs"))
+
+    def fails(candidate: dict[str, Any]) -> bool:
+        try:
+            scenario = from_data(copy.deepcopy(candidate), "candidate")
+        except ScenarioError:
+            return False
+        return {"ugv2", "ugv7"} <= scenario.ugvs.keys()
+
+    small, _ = shrink(data, fails, 300)
+    assert [*small["ugvs"]] == ["ugv2", "ugv7"]
+    assert [uav["ugvs"] for uav in small["uavs"].values()] == [["ugv7", "ugv2"]]
+
+
 def test_shapes_become_plain_and_the_arena_goes() -> None:
     data = resolved(load("minimal"))
     ell = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]]

@@ -82,6 +82,11 @@ def test_obstacles_of_a_course_are_clear_of_a_low_uav_and_one_without_room_canno
             spec.draw(0)
 
 
+def test_a_course_has_one_uav(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="course: the scenario has uavs; wanted: one UAV, in uav"):
+        spec_of(tmp_path, "scenario: two_uavs\ncourse: {ugvs: 2}\n").draw(0)
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -14,10 +14,12 @@ from airground_drake.base.errors import SimulationError
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
 from airground_drake.sim.batch import loop
 from airground_drake.sim.batch.loop import Team
+from airground_drake.sim.batch.run import Going
 from airground_drake.sim.blocks.controllers import UavController
 from airground_drake.study.campaign import work
-from airground_drake.study.campaign.rows import BATCH, BOTH, COLUMNS, DRAKE, INVALID, JUDGED, SCREENED, STOPPED
+from airground_drake.study.campaign.rows import BATCH, BOTH, CLOCK, COLUMNS, DRAKE, INVALID, JUDGED, SCREENED, STOPPED
 from airground_drake.study.campaign.spec import Spec, load_spec
+from airground_drake.uav.database import Asked
 from airground_drake.verify import array_judges
 
 CASE_A = Path(__file__).parents[3] / "benchmarks" / "campaigns" / "case_a.yaml"
@@ -178,6 +180,15 @@ def test_what_array_judges_cannot_tell_is_judged_by_the_trace(spec: Spec, monkey
     monkeypatch.setattr(array_judges.ArrayJudges, "findings", lambda *_: {})
     rows = work.rows_of(spec, 5, DEFAULT_LIMITS)
     assert {(row["engine"], row["status"]) for row in rows} == {(BATCH, "holds")}
+
+
+def test_a_run_in_which_a_policy_met_the_clock_is_listed(spec: Spec, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is not compared: Drake's run need not have met it."""
+    late = Asked(0.0, "ugv1", "detour", what="OutOfTime: not done after 2 s")
+    monkeypatch.setattr(Going, "memory", property(lambda self: replace(self._memory, asked=(late,))))
+    for share in (0.0, 1.0):
+        monkeypatch.setattr(work, "SHARE", share)
+        assert {row["engine"] for row in work.rows_of(spec, 5, DEFAULT_LIMITS)} == {CLOCK}
 
 
 def test_a_screened_row_is_that_of_the_judge_of_traces(monkeypatch: pytest.MonkeyPatch) -> None:

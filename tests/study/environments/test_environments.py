@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import SyncVectorEnv
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 from airground_drake.base.errors import ScenarioError, UnknownNameError
@@ -20,13 +21,15 @@ from airground_drake.model.geometry import outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.scenario.load import load, validated
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.batch.run import LeftToDrakeError
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.tables import TABLES
 from airground_drake.sim.trace import Trace
 from airground_drake.study.campaign.spec import Spec, load_spec
+from airground_drake.study.environments import episode
 from airground_drake.study.environments.encoding import Encoding, free_ways
 from airground_drake.study.environments.episode import Episode, Stage, with_agent
-from airground_drake.study.environments.gymnasium_env import ID, InterventionEnv
+from airground_drake.study.environments.gymnasium_env import ID, InterventionEnv, InterventionVectorEnv
 from airground_drake.study.environments.pettingzoo_env import TeamEnv
 from airground_drake.study.environments.sources import Source
 from airground_drake.uav.planner import Planner
@@ -134,10 +137,10 @@ def aside(seen: Observation) -> list[float]:
     return [-1.0 if seen.refusals % 3 == 1 else 1.0, 0.1, 0.3, 0.4, 0.3 - 0.1 * seen.refusals]
 
 
-@pytest.mark.parametrize("name", ["case_a", "warehouse", "crowd"])
-def test_it_is_the_run_of_an_ordinary_policy(name: str) -> None:
+@pytest.mark.parametrize(("name", "duration_s"), [("case_a", 20.0), ("warehouse", 15.0), ("crowd", 20.0)])
+def test_it_is_the_run_of_an_ordinary_policy(name: str, duration_s: float) -> None:
     """All tables are equal to the last bit, so proposals are checked, sent and judged alike."""
-    scenario = load(name, {"duration_s": 20.0})
+    scenario = load(name, {"duration_s": duration_s})  # an episode ends when all have arrived
     episode = Episode(Stage(with_agent(scenario, "d"), "d"), seed=3)
     asked = 0
     while requests := episode.requests():
@@ -332,11 +335,34 @@ def test_an_environment_goes_on_as_its_copy_does(kind: type[InterventionEnv] | t
     assert same(copied.trace(), env.trace())
 
 
-def test_an_episode_that_drake_makes_is_not_copied() -> None:
-    env = InterventionEnv(load("lagging", {"duration_s": 2.0}))
+def test_an_episode_that_drake_makes_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
+    def left(*_: object) -> None:
+        raise LeftToDrakeError
+
+    monkeypatch.setattr(episode, "Batch", left)
+    env = InterventionEnv(load("minimal", {"duration_s": 2.0}))
     env.reset(options={"number": 1})
     with pytest.raises(TypeError, match="its model is a Drake diagram; make a second environment"):
         copy.deepcopy(env)
+
+
+def test_environments_side_by_side_are_those_of_gymnasium(given: Scenario | Spec) -> None:
+    """Also after their episodes are over: the same arrays as by its own loop over single environments."""
+    ours = InterventionVectorEnv(3, given, numbers=range(1, 6))
+    theirs = SyncVectorEnv([lambda: InterventionEnv(given, numbers=range(1, 6))] * 3)
+    rng = np.random.default_rng(2)
+    assert ours.metadata["autoreset_mode"] is theirs.metadata["autoreset_mode"]
+    for mine, gymnasiums in zip(ours.reset(seed=7), theirs.reset(seed=7), strict=True):
+        assert str(mine) == str(gymnasiums)
+    ended = 0
+    for _ in range(12):
+        actions = rng.uniform(-1.0, 1.0, ours.action_space.shape).astype(np.float32)
+        steps = ours.step(actions), theirs.step(actions)
+        ended += steps[0][2].sum()
+        assert str(steps[0]) == str(steps[1])
+        for mine, gymnasiums in zip(steps[0][:4], steps[1][:4], strict=True):
+            assert (mine.dtype, mine.tolist()) == (gymnasiums.dtype, gymnasiums.tolist())
+    assert ended > 1
 
 
 def test_an_action_that_is_missing_is_named() -> None:
@@ -350,6 +376,13 @@ def test_an_action_that_is_missing_is_named() -> None:
 def test_the_registered_environment_needs_no_arguments() -> None:
     observation, _ = gymnasium.make(ID).reset(seed=1)
     assert observation[0] == 1.0
+    several = gymnasium.make_vec(ID, num_envs=2)
+    assert isinstance(several, InterventionVectorEnv)
+    assert (several.reset(seed=1)[0][0] == observation).all()
+    with pytest.raises(ValueError, match="num_envs is 0; allowed: a whole number from 1"):
+        InterventionVectorEnv(0)
+    with pytest.raises(ValueError, match="1 actions; wanted: 2"):
+        several.step(np.zeros((1, 5), dtype=np.float32))
 
 
 def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -385,6 +385,10 @@ def test_a_further_uav_is_judged_like_the_first(tmp_path: Path, document: dict[s
     new = {(pair.first, pair.second): pair for pair in found.pairs if "uav2" in (pair.first, pair.second)}
     assert {*new} == {("tb_0", "uav2"), ("tb_1", "uav2"), ("uav2", "pillar")}
     assert new["tb_0", "uav2"].safe_m == logs.GAPS["air_ground_m"]
+    apart = document | {"safe_distance": document["safe_distance"] | {"uav_m": 0.6}}
+    judged = {(pair.first, pair.second): pair for pair in judge(logs.read(path, apart, uavs=["uav2"]), apart).pairs}
+    assert judged["uav", "uav2"].safe_m == 0.6
+    assert judged["uav", "uav2"].least_m == pytest.approx(0.9 - 2.0 * logs.RADII["uav"])
 
 
 @pytest.mark.parametrize(

@@ -78,10 +78,6 @@ def refused(table: pd.DataFrame) -> Any:
     return table["reason"] == "stalls"
 
 
-def for_another(table: pd.DataFrame) -> Any:
-    return table["reason"] == "joint_refused"
-
-
 def executing(table: pd.DataFrame) -> Any:
     return (table["reason"] == "kept") & (table["decision"] == "accept")
 

@@ -1,0 +1,124 @@
+"""The channel between a UAV and its UGVs, as two LeafSystems.
+
+What a link delivers is computed from its state, its input and the time; the update at each control period stores the
+same. So a link without delay and loss delays nothing, not even by a period.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import Context, EventStatus, LeafSystem, State, ValueProducer
+
+from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.uav.channel import Link, Transit
+from airground_drake.uav.outbox import Outbox, posted, repeated
+from airground_drake.uav.planner import PlannerState
+
+
+@dataclass(frozen=True)
+class Down:
+    """The state of the link from a UAV."""
+
+    box: Outbox = field(default_factory=Outbox)
+    transit: Transit = field(default_factory=Transit)
+    read_s: tuple[float, ...] = ()  # when the UAV read each answer that arrived, s, in the order of arrival
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Immutable: the copy is the object itself."""
+        return self
+
+
+class Downlink(LeafSystem):
+    """From a UAV to its UGVs; the UAV repeats what nobody has shown to have read.
+
+    Ports: in `sent`, the planner's memory; `heard`, see `Uplink`, used by updates only; out `inbox`, all deliveries so
+    far, in the order of arrival.
+    State: abstract, a `Down`.
+    Rate: one update per control period, from t = 0.
+    """
+
+    def __init__(self, link: Link, start: PlannerState, period: float, retry: float) -> None:
+        """Of a link; a message is repeated after `retry`, s."""
+        super().__init__()
+        self._link, self._retry = link, retry
+        self._sent = self.DeclareAbstractInputPort("sent", Value(start))
+        self._heard = self.DeclareAbstractInputPort("heard", Value(Transit()))
+        held = self.DeclareAbstractState(Value(Down()))
+        self._state, needs = int(held), {self.abstract_state_ticket(held), self._sent.ticket(), self.time_ticket()}
+        producer = ValueProducer(allocate=lambda: Value(Down()), calc=weakly(self._calc))
+        self._now = self.DeclareCacheEntry("now", producer, needs).cache_index()
+        self.DeclareAbstractOutputPort(
+            "inbox", lambda: Value(()), weakly(self._calc_inbox), prerequisites_of_calc=needs
+        )
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, weakly(self._update))
+
+    def now(self, context: Context) -> Down:
+        """The link at the time of this Context."""
+        state: Down = self.get_cache_entry(self._now).Eval(context)
+        return state
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        before: Down = context.get_abstract_state(self._state).get_value()
+        box = posted(before.box, self._sent.Eval(context))
+        output.set_value(self._carried(before, box, context.get_time()))
+
+    def _carried(self, before: Down, box: Outbox, t: float) -> Down:
+        transit = self._link.carry(before.transit, box.messages, t)
+        if box is before.box and transit is before.transit:
+            return before
+        return replace(before, box=box, transit=transit)
+
+    def _calc_inbox(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.now(context).transit.arrived)
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        held, t = state.get_mutable_abstract_state(self._state), context.get_time()
+        now, heard = self.now(context), self._heard.Eval(context)
+        after = self._carried(now, repeated(now.box, heard, t, self._retry), t)
+        unread = len(heard.arrived) - len(now.read_s)
+        if unread:
+            after = replace(after, read_s=now.read_s + (t,) * unread)
+        if after is held.get_value():
+            return EventStatus.DidNothing()
+        held.set_value(after)
+        return EventStatus.Succeeded()
+
+
+class Uplink(LeafSystem):
+    """From UGVs to their UAV.
+
+    Ports: in `outbox`, all answers sent so far; out `heard`, the state of the link.
+    State: abstract, a `Transit`.
+    Rate: one update per control period, from t = 0.
+    """
+
+    def __init__(self, link: Link, period: float) -> None:
+        super().__init__()
+        self._link = link
+        self._outbox = self.DeclareAbstractInputPort("outbox", Value(()))
+        held = self.DeclareAbstractState(Value(Transit()))
+        self._state, needs = int(held), {self.abstract_state_ticket(held), self._outbox.ticket(), self.time_ticket()}
+        self._heard = self.DeclareAbstractOutputPort(
+            "heard", lambda: Value(Transit()), weakly(self._calc), prerequisites_of_calc=needs
+        )
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, weakly(self._update))
+
+    def now(self, context: Context) -> Transit:
+        """The link at the time of this Context."""
+        state: Transit = self._heard.Eval(context)
+        return state
+
+    def _calc(self, context: Context, output: AbstractValue) -> None:
+        before: Transit = context.get_abstract_state(self._state).get_value()
+        output.set_value(self._link.carry(before, self._outbox.Eval(context), context.get_time()))
+
+    def _update(self, context: Context, state: State) -> EventStatus:
+        held = state.get_mutable_abstract_state(self._state)
+        now = self.now(context)
+        if now is held.get_value():
+            return EventStatus.DidNothing()
+        held.set_value(now)
+        return EventStatus.Succeeded()

@@ -1,0 +1,140 @@
+"""What a channel does to messages: late, lost, doubled, overtaken. Pure, and without any state but what is under way.
+
+The fate of a message is a function of the seed, the link, and the message's kind, number and attempt. So no random
+state is kept, a value may be computed twice, and a run with another delay loses the same messages.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from bisect import bisect_right
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any, Literal, NamedTuple, Self
+
+from airground_drake.model.bodies.motion import SAME_S
+
+Kind = Literal["proposal", "withdrawal", "answer"]
+
+
+class Message(NamedTuple):
+    """A message between a UAV and a UGV."""
+
+    kind: Kind
+    number: int  # counts the messages of its kind
+    about: int  # number of the proposal
+    ugv: int  # index of the UGV that sends or receives it
+    sent_s: float  # s
+    attempt: int = 0  # how often it was sent before
+    content: Any = None  # a `Proposal`, or a `Told`
+
+
+class Delivery(NamedTuple):
+    """A message that arrives."""
+
+    received_s: float  # s
+    order: int  # of the message among all of its link
+    copy: int  # 0, or 1 if the channel doubled it
+    message: Message
+
+
+@dataclass(frozen=True)
+class Transit:
+    """The state of a link."""
+
+    taken: int = 0  # messages taken from the sender
+    under_way: tuple[Delivery, ...] = ()  # by time of arrival
+    arrived: tuple[Delivery, ...] = ()  # by time of arrival
+    lost: tuple[Message, ...] = ()
+    # per UGV, of the messages that arrived, the one sent last
+    newest: dict[int, Delivery] = field(default_factory=dict)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Immutable: the copy is the object itself."""
+        return self
+
+
+class Quality(NamedTuple):
+    """What a link does to messages."""
+
+    delay_s: float = 0.0
+    jitter_s: float = 0.0  # a message is late by up to this, uniformly
+    loss: float = 0.0  # share of messages lost
+    burst_s: float = 0.0  # mean duration of a loss; 0: each message is lost for itself
+    duplicate: float = 0.0  # share of messages that arrive twice
+    reorder: bool = True  # whether a message may overtake another one
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link from a UAV to its UGVs, or back."""
+
+    quality: Quality
+    seed: int
+    name: str  # of the link; links of different names have nothing in common
+
+    def carry(self, before: Transit, sent: tuple[Message, ...], t: float) -> Transit:
+        """The state at time t, s, when so many messages have been sent since the beginning."""
+        now = before
+        if len(sent) > before.taken:
+            now = self._taken(before, sent)
+        due = bisect_right(now.under_way, t + SAME_S, key=lambda delivery: delivery.received_s)
+        if not due:
+            return now
+        newest = dict(now.newest)
+        for delivery in now.under_way[:due]:
+            last = newest.get(delivery.message.ugv)
+            if last is None or delivery.order > last.order:
+                newest[delivery.message.ugv] = delivery
+        arrived = now.arrived + now.under_way[:due]
+        return replace(now, under_way=now.under_way[due:], arrived=arrived, newest=newest)
+
+    def _taken(self, before: Transit, sent: tuple[Message, ...]) -> Transit:
+        under_way, lost = list(before.under_way), list(before.lost)
+        for order in range(before.taken, len(sent)):
+            message = sent[order]
+            delays = self.fate(message)
+            if not delays:
+                lost.append(message)
+            # without overtaking, none arrives before another one that was sent to or by the same UGV
+            ahead = 0.0
+            if not self.quality.reorder:
+                ahead = max((d.received_s for d in under_way if d.message.ugv == message.ugv), default=0.0)
+            under_way += [
+                Delivery(max(message.sent_s + delay, ahead), order, copy, message) for copy, delay in enumerate(delays)
+            ]
+        return replace(before, taken=len(sent), under_way=tuple(sorted(under_way)), lost=tuple(lost))
+
+    def fate(self, message: Message) -> list[float]:
+        """By how much each copy of a message is late, s; none if it is lost."""
+        quality, link = self.quality, f"{self.seed}/{self.name}/{message.ugv}"
+        lot = random.Random(f"{link}/{message.kind}/{message.number}/{message.attempt}")
+        lost, doubled, first, second = (lot.random() for _ in range(4))
+        if quality.burst_s > 0.0:
+            gone = quality.loss > 0.0 and _is_bad(link, quality.loss, quality.burst_s, message.sent_s)
+        else:
+            gone = lost < quality.loss
+        delays = [quality.delay_s + quality.jitter_s * late for late in (first, second)]
+        return [] if gone else delays if doubled < quality.duplicate else delays[:1]
+
+
+def _is_bad(link: str, loss: float, burst_s: float, t: float) -> bool:
+    """Whether a link loses everything at time t, s: two states, each left after an exponential time (Gilbert)."""
+    # No list is longer than needed, and a longer one begins like a shorter one.
+    until = 256.0 * 2.0 ** max(0, math.ceil(math.log2(max(t, 1.0) / 256.0)))
+    begins_bad, changes = _changes(link, loss, burst_s, until)
+    return begins_bad != bool(bisect_right(changes, t) % 2)
+
+
+@lru_cache(maxsize=256)
+def _changes(link: str, loss: float, burst_s: float, until: float) -> tuple[bool, tuple[float, ...]]:
+    """Whether a link is bad at first, and when it changes, s."""
+    lot, t, changes = random.Random(f"{link}/bursts"), 0.0, list[float]()
+    begins_bad = bad = lot.random() < loss
+    while t <= until:
+        rate = 1.0 / burst_s if bad else loss / (burst_s * (1.0 - loss))
+        t += lot.expovariate(rate) if rate > 0.0 else math.inf
+        changes.append(t)
+        bad = not bad
+    return begins_bad, tuple(changes)

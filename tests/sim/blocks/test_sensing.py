@@ -1,0 +1,211 @@
+"""Errors of measured positions: robots act on what they see, claims are about what is true, and the law pays for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from properties import examples
+
+from airground_drake.base.errors import PluginError, ScenarioError
+from airground_drake.check import safety
+from airground_drake.check.run import Run
+from airground_drake.model.bodies.world import Body
+from airground_drake.model.law import kernels
+from airground_drake.model.plants.budget import Bounds, costs, kept_distance, law_distance, least_gain
+from airground_drake.scenario.budget import budget
+from airground_drake.scenario.load import from_data, load, resolved
+from airground_drake.scenario.schema import ERRORS, Scenario
+from airground_drake.scenario.world import make_world
+from airground_drake.sim.blocks.sensing import Errors
+from airground_drake.sim.diagram import make_monitor
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
+from airground_drake.verify import judge, judge_model
+
+ERROR_M = 0.05
+
+
+def crossing(**sensing: Any) -> Scenario:
+    """Two UGVs whose ways cross, and a rock beside one of them."""
+
+    def ugv(start: list[float], target: list[float]) -> dict[str, Any]:
+        return {"start_m": start, "target_m": target, "preset": {"waypoints_m": [start, target]}, "max_speed_m_s": 2.0}
+
+    data = {
+        "name": "crossing_of_two", "duration_s": 12.0,
+        "ugvs": {"ugv1": ugv([-5.0, 0.0, 0.0], [5.0, 0.0, 0.0]), "ugv2": ugv([0.0, -5.0, 0.0], [0.0, 5.0, 0.0])},
+        "uav": {"start_m": [-2.5, -2.5, 2.0]},
+        "obstacles": {"rock": {"position_m": [2.5, 0.3, 0.0], "radius_m": 0.3}},
+        "safe_distance": {"obstacle_m": 0.6, "ugv_m": 0.6},
+        "control": {"period_s": 0.05, "avoidance_gain_1_s": 8.0},
+        "decision": {"threshold": {"zeta_m": 1.2}, "release_m": 0.8, "noise_period_s": 0.05},
+        "intervention": {"policies": [{"name": "coordinate"}]},
+        "runs": {"a": {"method": "a"}, "d": {"method": "d"}},
+        **({"sensing": {"position_error_m": ERROR_M, **sensing}} if sensing else {}),
+    }  # fmt: skip
+    return from_data(data, "test")
+
+
+@cache
+def run(errors: str, method: str = "d") -> Trace:
+    return simulate(crossing(errors=errors, uav_error_m=0.03), method)
+
+
+def found(trace: Trace, *claims: str) -> dict[str, str]:
+    return {verdict.claim.id: verdict.status for verdict in judge(trace, claims or None)}
+
+
+def checked(trace: Trace) -> Run:
+    return Run("d", resolved(trace.scenario), trace.events, trace.states, trace.samples)
+
+
+@pytest.mark.parametrize("errors", ERRORS)
+def test_distances_are_kept_and_the_theorem_covers_the_run(errors: str) -> None:
+    trace = run(errors)
+    verdicts = {verdict.claim.id: verdict for verdict in judge(trace)}
+    assert verdicts["SAFE-HYP"].exercised
+    assert {verdicts[claim].status for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP", "GATE-PLAN")} == {"holds"}
+    ours = safety.safe_hyp(checked(trace))
+    assert ours.status == "holds"
+    assert ours.margin == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("errors", ERRORS)
+def test_what_robots_act_on_is_recorded_within_its_bound(errors: str) -> None:
+    trace = run(errors)
+    world = make_world(trace.scenario)
+    assert trace.scenario.sensing
+    given = Errors(trace.scenario.sensing, world)
+    true = np.stack([trace.position(name)[trace.sample_rows] for name in trace.robots], axis=1)
+    for robot, i in zip(trace.robots, range(len(trace.robots)), strict=True):
+        seen = trace.as_seen("ugv1", robot)
+        off = np.linalg.norm(seen - true[:, i], axis=1)
+        assert off.max() <= ERROR_M
+        assert off.max() > 0.9 * ERROR_M if errors != "drawn" else off.max() > 0.4 * ERROR_M
+    for k in (0, 7, 61):  # the same again: an error depends on nothing else
+        t = float(trace.sampled("t_s")[k])
+        published = np.stack([trace.as_seen("uav", robot)[k] for robot in trace.robots])
+        assert np.allclose(given.published(t, true[k]), published, atol=1e-12)
+        saw = np.array([[trace.sampled(f"{ugv}.uav_saw_{axis}_m")[k] for axis in "xyz"] for ugv in trace.ugvs])
+        assert 0.0 < np.linalg.norm(saw - true[k, :2], axis=1).max() <= 0.03
+
+
+def test_a_law_that_does_not_pay_for_errors_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = Body.bounds.fget  # type: ignore[attr-defined]
+    monkeypatch.setattr(Body, "bounds", property(lambda self: right(self)._replace(error_m=0.0)))
+    trace = simulate(crossing(errors="away"), "a")
+    assert found(trace, "SAFE-TRACE", "SAFE-HYP") == {"SAFE-TRACE": "refuted", "SAFE-HYP": "refuted"}
+    assert safety.safe_hyp(checked(trace)).status == "refuted"
+
+
+def test_measured_positions_beyond_their_bound_are_found() -> None:
+    trace = run("away")
+    samples = trace.samples.copy()
+    place = trace.position("ugv1")[trace.sample_rows[40]]
+    samples.loc[40, "ugv1.seen_x_m"] = place[0] + ERROR_M + 1e-6
+    forged = replace(trace, samples=samples)
+    (verdict,) = judge(forged, ["SAFE-HYP"])
+    assert verdict.status == "refuted"
+    assert verdict.counterexample
+    ours = safety.safe_hyp(checked(forged))
+    assert ours.because is not None
+    assert ours.because.rule == "error of the measured position"
+
+
+def test_the_model_says_what_the_budget_needs() -> None:
+    scenario = crossing(errors="away")
+    (verdict,) = judge_model(scenario, claims=["SAFE-BUDGET"])
+    assert verdict.status == "proved"
+    assert "Budget.one_stands" in verdict.evidence.theorems
+    terms = {pair.kind: (pair.gap_m - pair.promised_m, [term.key for term in pair.terms]) for pair in budget(scenario)}
+    assert terms["ugv"] == (pytest.approx(0.1083, abs=5e-5), ["position_error_m"])
+    assert terms["obstacle"] == (pytest.approx(0.0514, abs=5e-5), ["position_error_m"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"control.avoidance_gain_1_s": 5.6}, r"avoidance_gain_1_s: 5.6 .*at least 5\.64\d+ 1/s .*stand for the other"),
+        ({"control.avoidance_gain_1_s": 0.0}, "at least"),
+        ({"obstacles.rock.max_speed_m_s": 0.1}, "0: rock may move, and nothing is promised"),
+        ({"runs.a.composition": "recursion_listed"}, "augmented: robots stand"),
+        ({"ugvs.ugv2.start_m": [-4.33, 0.0, 0.0]}, r"needs 0\.71 m in the law .*they start 0\.67 m apart"),
+        ({"sensing.position_error_m": -0.1}, "a number in m from 0"),
+        ({"sensing.errors": "loud"}, "one of drawn, adversarial, away, sideways"),
+    ],
+)
+def test_scenarios_that_do_not_bear_the_errors_are_refused(changes: dict[str, Any], said: str) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        from_data(resolved(crossing(errors="away")), "test", changes)
+
+
+def test_without_the_key_nothing_is_written_of_it_and_the_loop_makes_the_run() -> None:
+    assert "sensing" not in resolved(load("minimal"))
+    measured = crossing(errors="drawn")
+    drake, loop = (simulate(measured, "a", engine=engine) for engine in ("drake", "batch"))  # Drake makes both
+    assert drake.samples.equals(loop.samples)
+    with pytest.raises(PluginError, match="a monitor sees true positions"):
+        make_monitor(measured)
+
+
+def test_a_robot_stands_where_inequalities_contradict_one_another() -> None:
+    normal, bound = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), np.array([0.1, 0.1])
+    wish = np.array([0.5, 0.5, 0.0])
+    assert not kernels.avoid_one(wish, normal, bound, kernels.STANDING).any()
+    assert kernels.avoid_one(wish, normal, bound - 0.2, kernels.STANDING).tolist() == pytest.approx([0.1, 0.5, 0.0])
+
+
+def any_bounds() -> st.SearchStrategy[Bounds]:
+    numbers = st.tuples(*[st.floats(0.0, 0.3)] * 4, st.floats(0.5, 2.0), st.floats(0.001, 0.3))
+    return numbers.map(lambda given: Bounds(*given[:4], speed_m_s=given[4], error_m=given[5]))
+
+
+@examples(60)
+@given(st.floats(0.1, 3.0), any_bounds(), any_bounds() | st.just(Bounds()))
+def test_the_law_keeps_what_the_theorem_asks_for(distance: float, one: Bounds, other: Bounds) -> None:
+    """d_law >= err + loss / A' + sqrt(m^2 + err^2), with what the bodies take before errors; and back again."""
+    gain, part = 5.0, 1.0 if other == Bounds() else 0.5
+    law = float(law_distance(distance, one, other, gain=gain))
+    error, loss = one.error_m + other.error_m, one.drift_m_s + other.drift_m_s
+    without = [bounds._replace(error_m=0.0, drift_m_s=0.0) for bounds in (one, other)]
+    before = float(law_distance(distance, *without, gain=gain))
+    assert law == pytest.approx(error + loss / (gain * part) + np.hypot(before, error), rel=1e-12)
+    assert distance * (1.0 - 1e-9) <= kept_distance(law, one, other, gain=gain) + 1e-9 <= distance + 2e-9
+    total = distance + sum(cost.metres for cost in costs(distance, one, other, gain=gain))
+    assert total == pytest.approx(law, rel=1e-12)
+    least = least_gain(distance, one, other)
+    kept = law - error - loss / (gain * part)
+    assert error * (1.0 - part * least) == pytest.approx(part * least * kept, rel=1e-9)
+
+
+def orbited(error: float, gain_share: float, distance: float = 0.6, period: float = 0.05) -> float:
+    """The least distance, m, at which a robot goes round a point that it always sees the worst way: abreast of it."""
+    share = gain_share * least_gain(distance, Bounds(error_m=error))
+    law = float(law_distance(distance, Bounds(error_m=error), gain=share / period))
+    place, nearest = np.array([law, 0.0, 0.0]), law
+    for _ in range(200):
+        apart = float(np.linalg.norm(place))
+        if apart <= error:
+            return 0.0
+        seen, turn = np.sqrt(apart**2 - error**2), np.arctan2(place[1], place[0]) + np.arcsin(error / apart)
+        normal = np.array([[np.cos(turn), np.sin(turn), 0.0]])
+        bound = share / period * (law - seen) if seen <= law else -(law - seen) / period
+        wish = error / period * np.array([-normal[0, 1], normal[0, 0], 0.0])
+        step = period * kernels.avoid_one(wish, normal, np.array([bound]), kernels.STANDING)
+        along = float(np.clip(-(place @ step) / max(step @ step, 1e-12), 0.0, 1.0))
+        nearest = min(nearest, float(np.linalg.norm(place + along * step)))
+        place = place + step
+    return nearest
+
+
+@pytest.mark.parametrize("error", [0.02, 0.05, 0.25])
+def test_the_condition_on_the_gain_is_needed(error: float) -> None:
+    """Directions that are wrong in each period add up, unless the gain makes up for them."""
+    assert orbited(error, 1.0) >= 0.6
+    assert orbited(error, 0.2) < 0.6 - 0.1 * error

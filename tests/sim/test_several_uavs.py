@@ -1,0 +1,230 @@
+"""Several UAVs: each in charge of its UGVs, apart from each other, and one of them lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from builders.edits import moved, with_scenario
+from builders.misbuilt import distances
+from oracles import ORACLES, faults_of
+from pydrake.systems.analysis import Simulator
+from verify.judging import decided
+
+from airground_drake.check.scenario import pairs_of
+from airground_drake.scenario.load import from_data, load, resolved
+from airground_drake.sim import graphviz
+from airground_drake.sim.batch.run import Batch, LeftToDrakeError
+from airground_drake.sim.diagram import build_diagram, make_monitor
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
+from airground_drake.study.environments.episode import Episode, Stage, with_agent
+from airground_drake.uav.coordinate import Coordinate
+from airground_drake.uav.policy import Observation
+from airground_drake.verify.pair_kinds import apart
+from airground_drake.verify.proofs.export import demands
+from airground_drake.verify.runs.proposals import proposals_of
+
+Run = Callable[..., Trace]
+CROSSED = {
+    "uavs.north.ugvs": ["ugv1", "ugv3", "ugv5", "ugv7"],
+    "uavs.south.ugvs": ["ugv2", "ugv4", "ugv6", "ugv8"],
+    "uavs.north.target_m": [-1.0, 0.0, 3.0],
+    "uavs.south.target_m": [1.0, 0.0, 3.0],
+}
+"""Both teams have their centroid at the same place, over which both UAVs are to fly."""
+
+
+@pytest.fixture(scope="module")
+def trace(run: Run) -> Trace:
+    """Run (d) of the shipped scenario: south is lost at 10 s."""
+    return run("two_uavs", "d")
+
+
+@pytest.fixture(scope="module")
+def lost_s(trace: Trace) -> float:
+    return trace.scenario.aerial["south"].lost_at_s
+
+
+@pytest.fixture(scope="module")
+def crossed() -> Trace:
+    return simulate(load("two_uavs", {**CROSSED, "duration_s": 6.0}), "a")
+
+
+def test_each_uav_asks_its_own_ugvs_only_and_all_have_numbers_of_their_own(trace: Trace) -> None:
+    sent = proposals_of(trace)
+    assert {proposal.sender for proposal in sent} == {"north", "south"}
+    assert all(proposal.ugv in trace.scenario.in_charge(proposal.sender) for proposal in sent)
+    assert len({proposal.number for proposal in sent}) == len(sent)
+    parties = trace.messages.groupby(["kind", "sender", "receiver"]).size().index
+    assert {(a, b) for kind, a, b in parties if kind == "proposal"} == {
+        (uav, ugv) for uav in trace.uavs for ugv in trace.scenario.in_charge(uav)
+    }
+    assert all(a in trace.scenario.in_charge(b) for kind, a, b in parties if kind == "answer")
+
+
+def test_a_lost_uav_neither_sends_nor_hears_anything(trace: Trace, lost_s: float) -> None:
+    table = trace.messages
+    assert table[table["sender"] == "north"]["sent_s"].max() > lost_s
+    assert table[table["sender"] == "south"]["sent_s"].max() < lost_s
+    answers = table[(table["kind"] == "answer") & (table["receiver"] == "south")]
+    assert answers["read_s"].max() < lost_s
+    assert answers[answers["sent_s"] >= lost_s]["read_s"].isna().all()
+    assert trace.plans[trace.plans["uav"] == "south"]["t_s"].max() < lost_s
+
+
+def test_ugvs_of_a_lost_uav_drive_what_they_accepted_to_its_end(trace: Trace, lost_s: float) -> None:
+    t, driven = trace.sampled("t_s"), 0
+    for sent in (sent for sent in proposals_of(trace) if sent.sender == "south"):
+        executing = t[trace.sampled(f"{sent.ugv}.executing") == sent.number]
+        period = trace.scenario.intervention.period_s
+        assert executing.max() > lost_s
+        assert sent.times_s[-1] - period - 1e-9 <= executing.max() <= sent.times_s[-1] + period + 1e-9
+        driven += 1
+    assert driven == 4
+
+
+def test_all_arrive_and_nothing_is_found_wrong(trace: Trace) -> None:
+    assert {event["robot"] for event in trace.events if event["kind"] == "arrival"} == {*trace.robots}
+    for claim in ("SAFE-TRACE", "SAFE-HYP", "GATE-PLAN", "LIVE-HYP", "LIVE-GOAL"):
+        assert decided(claim, trace).status == "holds"
+    assert not faults_of(trace)
+
+
+def test_a_uav_alone_that_is_lost_helps_nobody_any_more(run: Run) -> None:
+    trace = run("crossing", "d", set=["uav.lost_at_s=5", "duration_s=15"])
+    assert trace.proposals.empty
+    assert not {event["robot"] for event in trace.events if event["kind"] == "arrival"} - {"uav"}
+    assert not faults_of(trace)
+
+
+@pytest.mark.parametrize("method", ["b", "c"])
+@pytest.mark.parametrize("lost_at_s", [8.23, 12.0])
+def test_other_methods_forget_what_a_lost_uav_asked_at_its_end_too(method: str, lost_at_s: float) -> None:
+    over = {"runs": {method: {"method": method}}, "uavs.south.lost_at_s": lost_at_s, "duration_s": 20.0}
+    trace = simulate(load("two_uavs", over), method)
+    assert proposals_of(trace)
+    assert not faults_of(trace)
+
+
+def test_uavs_keep_apart(crossed: Trace) -> None:
+    away = np.linalg.norm(crossed.position("north") - crossed.position("south"), axis=1)
+    assert 1.0 - 1e-9 < away.min() < 1.0 + 1e-3
+    assert decided("SAFE-HYP", crossed).evidence["inequalities_that_bind"]["uav beside uav"] > 0
+    assert not faults_of(crossed)
+    row = int(away.argmin())
+    towards = 0.01 * (crossed.position("south") - crossed.position("north"))[row]
+    assert decided("SAFE-TRACE", moved(crossed, "north", row, towards.tolist())).status == "refuted"
+    wider = with_scenario(crossed, safe_distance__uav_m=1.2)
+    assert (decided("SAFE-TRACE", wider).status, decided("SAFE-HYP", wider).status) == ("refuted", "refuted")
+
+
+def test_the_distance_between_uavs_that_controllers_are_built_with_is_read_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    distances(0.9999, "uav")(monkeypatch)
+    found = decided("SAFE-HYP", simulate(load("two_uavs", {"duration_s": 1.0}), "a"))
+    about = {"controller": "uav_controller_north", "parameter": "safe_m", "robot": "north", "other": "south"}
+    assert found.status == "refuted"
+    assert about.items() <= (found.counterexample or {}).items(), found.counterexample
+
+
+def test_checker_claims_and_theorems_ask_for_the_same_distances() -> None:
+    scenario = load("two_uavs")
+    asked = {(pair.first, pair.second): pair.required_m for pair in apart(scenario)}
+    checked = {(pair.robot, pair.other): pair.gap_m for pair in pairs_of(resolved(scenario))}
+    exported = {(demand.first, demand.second): float(demand.required_m) for demand in demands(scenario)}
+    assert asked == checked == exported
+    assert asked["north", "south"] == scenario.safe_distance.uav_m
+    assert [pair.kind for pair in apart(scenario) if pair.first == "north" and pair.second == "south"] == ["uav_uav"]
+
+
+def _forged(trace: Trace, lost_s: float) -> Iterator[tuple[str, Trace]]:
+    of = trace.proposals
+    yield "sent by a UAV that is not in charge", replace(trace, proposals=of.assign(sender="north"))
+    yield "sent by a UAV that is lost", with_scenario(trace, uavs__south__lost_at_s=8.0)
+    unread = trace.messages["read_s"].isna() & (trace.messages["receiver"] == "south")
+    read = trace.messages["read_s"].where(~unread, trace.messages["sent_s"] + 0.05)
+    yield "an answer is read by a UAV that is lost", replace(trace, messages=trace.messages.assign(read_s=read))
+    gone = {"kind": "withdrawal", "about": 1, "sent_s": lost_s + 1.0, "sender": "south", "receiver": "ugv6"}
+    row = trace.messages[trace.messages["kind"] == "withdrawal"].iloc[[0]].assign(**gone)
+    yield "withdrawn at another time", replace(trace, messages=pd.concat([trace.messages, row]))
+    yield "withdrawn at another time", with_scenario(trace, uavs__south__lost_at_s=0.0)
+
+
+def test_the_oracle_of_the_protocol_finds_what_lost_uavs_cannot_do(trace: Trace, lost_s: float) -> None:
+    for what, forged in _forged(trace, lost_s):
+        assert what in {fault.what for fault in ORACLES["protocol"](forged)}, what
+
+
+def test_plans_treat_what_other_uavs_ask_as_moving(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[Observation] = []
+    right = Coordinate.propose
+
+    def watched(self: Coordinate, observation: Observation) -> object:
+        seen.append(observation)
+        return right(self, observation)
+
+    monkeypatch.setattr(Coordinate, "propose", watched)
+    scenario = load("two_uavs", {"duration_s": 9.0})
+    simulate(scenario, "d")
+    asked = {
+        (mate.name, mate.proposal.sender)
+        for observation in seen for mate in observation.team if mate.proposal is not None and not mate.in_charge
+    }  # fmt: skip
+    assert asked
+    for observation in seen:
+        own_ugvs = {mate.name for mate in observation.team if mate.in_charge}
+        assert own_ugvs == {
+            *scenario.in_charge("north" if observation.robot in scenario.in_charge("north") else "south")
+        }
+        for mate in observation.team:
+            assert mate.proposal is None or (mate.proposal.sender in scenario.aerial)
+
+
+def test_the_loop_leaves_several_uavs_to_drake() -> None:
+    scenario = load("two_uavs", {"duration_s": 2.0})
+    with pytest.raises(LeftToDrakeError, match="several UAVs"):
+        Batch(scenario, "d")
+    with pytest.raises(LeftToDrakeError, match="lost"):
+        Batch(load("crossing", {"uav.lost_at_s": 1.0}), "d")
+    assert simulate(scenario, "d", engine="batch").states.equals(simulate(scenario, "d").states)
+
+
+def test_a_monitor_knows_the_laws_of_all_uavs() -> None:
+    scenario = load("two_uavs", {**CROSSED, "duration_s": 3.0})
+    diagram = build_diagram(scenario, "a", monitor=make_monitor(scenario, "a"))
+    simulator = Simulator(diagram)
+    simulator.get_mutable_context().SetAccuracy(1e-6)
+    simulator.AdvanceTo(3.0)
+    assert diagram.GetOutputPort("violation").Eval(diagram.GetMyContextFromRoot(simulator.get_context()))[0] == 0.0
+
+
+def test_the_picture_of_the_diagram_has_the_blocks_of_each_uav() -> None:
+    text = graphviz.dot(build_diagram(load("two_uavs"), "d"))
+    for block in ("intervention_planner_north", "uav_controller_south", "all_proposals"):
+        assert f"\n{block} [" in text
+    assert "on the UAV" in text
+
+
+def test_an_environment_asks_for_the_ugvs_of_all_uavs() -> None:
+    scenario = with_agent(load("two_uavs", {"duration_s": 9.0}), "d")
+    episode = Episode(Stage(scenario, "d"))
+    asked = set[str]()
+    while requests := episode.requests():
+        for ugv in requests:
+            asked.add(ugv)
+            episode.answer(ugv, None)
+    assert asked & {*scenario.in_charge("north")}
+    assert asked & {*scenario.in_charge("south")}
+
+
+def test_one_uav_among_uavs_is_as_uav() -> None:
+    given = resolved(load("case_a"))
+    kite = given.pop("uav") | {"name": "uav"}
+    alone = simulate(load("case_a", {"duration_s": 8.0}), "d")
+    spelled = from_data(given | {"uavs": {"uav": kite}, "duration_s": 8.0, "choices": []}, "test")
+    assert simulate(spelled, "d").states.equals(alone.states)
