@@ -5,8 +5,6 @@ JSON; runs that the file has are not made again. At the end there is a table: wh
 not; with several seeds the latest. Below it: what was judged otherwise than in the run without a channel.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections import defaultdict

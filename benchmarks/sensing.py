@@ -14,8 +14,6 @@ enlargement was used at most (tightness). Laws: `enlarged` is the package's, `pl
 one error of the two) and `whole-gain` (a gain at which A h bears the errors, but A h / 2 does not, times --gain).
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -8,8 +8,6 @@ lost 0.1 s before the first proposal of the run in which none is lost, or 0.1 s 
 been asked, and others have not.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Messages over a channel: what UGVs held and the UAV had heard, from the table of messages; who repeated what."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any

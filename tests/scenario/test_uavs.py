@@ -1,7 +1,5 @@
 """Several UAVs in a scenario: who is in charge of whom, what is filled in, and what is refused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Runs whose messages are late, lost, doubled and overtaken: what holds whatever the channel does."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Several UAVs: each in charge of its UGVs, apart from each other, and one of them lost."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 

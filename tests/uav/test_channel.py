@@ -1,7 +1,5 @@
 """What a channel does to messages, and what a UAV sends over it until it has been read."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """What UGVs read and answer over a channel, whatever it does to messages."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -68,11 +68,16 @@ def read(content: bytes) -> Table:
         raise LogError(f"it has {len(data)} rows; allowed: {MOST_ROWS}")
     good = [k for k in data if _count(lines[k], delimiter) == count]
     chosen = set(good)
-    cells = pd.read_csv(
-        io.StringIO("\n".join(lines[k] for k in good)), sep=delimiter if delimiter != " " else r"\s+", header=None,
-        names=list(range(count)), index_col=False, dtype=str, keep_default_na=False, na_filter=False,
-        skip_blank_lines=False,
-    )  # fmt: skip
+    try:
+        cells = pd.read_csv(
+            io.StringIO("\n".join(lines[k] for k in good)), sep=delimiter if delimiter != " " else r"\s+", header=None,
+            names=list(range(count)), index_col=False, dtype=str, keep_default_na=False, na_filter=False,
+            skip_blank_lines=False,
+        )  # fmt: skip
+    except pd.errors.ParserError as error:
+        raise LogError(f"it is not a table: {error}") from None
+    if len(cells) != len(good):
+        raise LogError("it is not a table: quotes are open at the end of a line")
     cells = cells.apply(lambda column: column.str.strip())
     if any(commas):
         for c in (c for c in range(count) if numeric[c] and not any(map(_POINT.fullmatch, columns[c]))):

@@ -1,7 +1,5 @@
 """Errors of measured positions: robots act on what they see, claims are about what is true, and the law pays for it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any

@@ -16,7 +16,7 @@ import yaml
 import zstandard
 from builders import logs
 from builders.logs import Ros
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from airground_drake.base import files
@@ -116,6 +116,8 @@ CELLS = st.sampled_from(["1", "2.5", "x", "nan", "", '"', "t", "1e999", "-1", "1
 TABLES = st.lists(st.lists(CELLS, max_size=6).map(";".join), max_size=9).map("\n".join)
 
 
+@example(b'0;;"')
+@example(b'0;1;"a\n0;1;b"\n0;1;2')
 @given(st.binary(max_size=400) | st.text(max_size=400).map(str.encode) | TABLES.map(str.encode))
 def test_noise_is_refused(content: bytes) -> None:
     try:
