@@ -38,7 +38,7 @@ from airground_drake.base.values import (
     Words,
     YesNo,
 )
-from airground_drake.model.bodies.world import Kind
+from airground_drake.model.bodies.kinds import Kind
 from airground_drake.scenario.kinds import (
     CLAIMS,
     AirPoint,

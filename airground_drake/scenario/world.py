@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from airground_drake.model.bodies.world import Body, Kind, World
+from airground_drake.model.bodies.kinds import Kind
+from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import outline
 from airground_drake.model.plants.scripted import Scripted
 from airground_drake.scenario.courses import course

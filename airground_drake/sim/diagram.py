@@ -18,7 +18,8 @@ from pydrake.trajectories import PiecewisePolynomial
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, UnknownNameError, short
 from airground_drake.base.registry import METHODS, UAV_TASKS, Method, method_of
-from airground_drake.model.bodies.world import ROBOTS, World
+from airground_drake.model.bodies.kinds import ROBOTS
+from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import COMPOSITIONS, Composition
 from airground_drake.model.law.task import Task

@@ -13,8 +13,9 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.motion import PeriodMotion
-from airground_drake.model.bodies.world import ROBOTS, Body
+from airground_drake.model.bodies.world import Body
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.encounter import least_apart
 from airground_drake.scenario.schema import MAP

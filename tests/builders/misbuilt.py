@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from airground_drake.model.bodies.world import Body, Kind, Neighbours, World
+from airground_drake.model.bodies.kinds import Kind
+from airground_drake.model.bodies.world import Body, Neighbours, World
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.sim import components

@@ -9,7 +9,8 @@ import pytest
 from builders.misbuilt import Patch
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.bodies.world import Kind, Neighbours, World
+from airground_drake.model.bodies.kinds import Kind
+from airground_drake.model.bodies.world import Neighbours, World
 from airground_drake.model.geometry.outline import moved
 from airground_drake.model.law import ugv_law as law
 from airground_drake.sim import components, diagram

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, NamedTuple, Self, get_args
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.kinds import KINDS, ROBOTS, Kind
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.geometry import outline
 from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
 from airground_drake.model.plants.plant import Plant
 from airground_drake.model.plants.scripted import Scripted
 from airground_drake.model.plants.steering import NUMBERS
-
-Kind = Literal["ugv", "uav", "obstacle"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
-ROBOTS: tuple[Kind, ...] = ("ugv", "uav")  # kinds of bodies that are commanded
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.bodies.world import ROBOTS
+from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.plants.plant import PLACE
 from airground_drake.model.trigger.automaton import FIELDS
 from airground_drake.report.view.draw import barrier_path, draw, robot_path, shadow_path, state_path

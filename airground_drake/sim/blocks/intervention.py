@@ -9,8 +9,9 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State, ValueProducer
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.motion import SAME_S
-from airground_drake.model.bodies.world import ROBOTS, World
+from airground_drake.model.bodies.world import World
 from airground_drake.model.trigger.automaton import FIELDS, INTERVENING
 from airground_drake.sim.blocks.lifetime import weakly
 from airground_drake.sim.blocks.signals import Messages, components_of, declare_bodies, no_proposals

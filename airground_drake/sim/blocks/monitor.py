@@ -12,7 +12,8 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.bodies.world import ROBOTS, World
+from airground_drake.model.bodies.kinds import ROBOTS
+from airground_drake.model.bodies.world import World
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.plants.steering import steer_all
 from airground_drake.sim.blocks.lifetime import weakly

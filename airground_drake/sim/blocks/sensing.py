@@ -10,8 +10,9 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.motion import SAME_S
-from airground_drake.model.bodies.world import ROBOTS, World
+from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import convex
 from airground_drake.scenario.schema import Sensing
 from airground_drake.sim.blocks.lifetime import weakly

@@ -11,7 +11,8 @@ from pydrake.systems.framework import Context, InputPort, LeafSystem
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, short
-from airground_drake.model.bodies.world import Kind, World
+from airground_drake.model.bodies.kinds import Kind
+from airground_drake.model.bodies.world import World
 from airground_drake.sim.blocks.lifetime import weakly
 from airground_drake.uav.messages import Report
 from airground_drake.uav.policy import Proposal

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.motion import PeriodMotion
-from airground_drake.model.bodies.world import ROBOTS, Body, World
+from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.plants.first_order import FirstOrder
 

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.model.bodies.world import ROBOTS, Neighbours, World
+from airground_drake.model.bodies.kinds import ROBOTS
+from airground_drake.model.bodies.world import Neighbours, World
 from airground_drake.model.geometry.outline import BASE, MIDDLE
 from airground_drake.model.law.avoidance import Avoidance, Composition
 

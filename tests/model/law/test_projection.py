@@ -12,7 +12,7 @@ from model.law.test_avoidance import scene
 from properties import examples
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.bodies.world import ROBOTS
+from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.law import kernels
 from airground_drake.model.law.avoidance import Avoidance
 
