@@ -52,8 +52,8 @@ WIRINGS = (
         "sensing range cut",
         "sim/components.py",
         "make_avoidance",
-        "control.period_s, control.sensing_range_m, composition)",
-        "control.period_s, 0.6 * control.sensing_range_m, composition)",
+        "control.period_s, control.sensing_range_m, composition, stands)",
+        "control.period_s, 0.6 * control.sensing_range_m, composition, stands)",
         tests=(*WIRING, *CROWD),
     ),
     Mutant(
@@ -99,7 +99,7 @@ LAW = (
     Mutant(
         "no scaling back",
         "model/law/kernels.py",
-        "avoid_one",
+        "_augmented",
         "velocity = _scale_back(velocity, normal, bound)",
         "velocity = velocity",
         tests=(*WIRING, "tests/model/law/test_avoidance.py"),

@@ -1,4 +1,4 @@
-"""The checker on runs with robots that turn, lag or get commands late: same verdicts, and forged bodies are found."""
+"""The checker on runs with robots that turn, lag, get commands late or are measured: same verdicts, forgeries found."""
 
 from typing import Any
 
@@ -19,6 +19,7 @@ from airground_drake.verify import judge
 
 FORWARDS = [f"ugvs.{name}.plant.backwards=false" for name in ("burger", "waffle", "tb4")]
 CAR = ["ugvs.burger.plant={kind: ackermann, hand_point_m: 0.1, wheelbase_m: 0.1, max_steering_rad: 0.8}"]
+MEASURED = ["sensing={position_error_m: 0.02, errors: adversarial}"]
 RUNS = (
     ("turtlebots car", 12.0),
     ("turtlebots", 12.0),
@@ -30,7 +31,7 @@ RUNS = (
 
 def given(name: str) -> Scenario:
     scenario, _, otherwise = name.partition(" ")
-    return load(scenario, {"": [], "forwards": FORWARDS, "car": CAR}[otherwise])
+    return load(scenario, {"": [], "forwards": FORWARDS, "car": CAR, "measured": MEASURED}[otherwise])
 
 
 def run_of(name: str, duration_s: float) -> tuple[Trace, Run]:
@@ -42,7 +43,7 @@ def checked(trace: Trace, states: pd.DataFrame) -> Run:
     return Run("a", resolved(trace.scenario), trace.events, states, trace.samples)
 
 
-@pytest.mark.parametrize(("name", "duration_s"), RUNS)
+@pytest.mark.parametrize(("name", "duration_s"), (*RUNS, ("swap measured", 8.0)))
 def test_the_checker_comes_to_the_same_verdicts(name: str, duration_s: float) -> None:
     trace, run = run_of(name, duration_s)
     for robot in run.robots:
@@ -96,6 +97,17 @@ def test_a_car_that_turns_more_sharply_than_it_can_is_found() -> None:
     states = trace.states.copy()
     states.loc[20:, "burger.heading_rad"] += 0.5
     assert refuted_for(trace, states) == "least turning radius"
+
+
+def test_positions_that_are_measured_worse_than_declared_or_with_too_small_a_gain_are_found() -> None:
+    trace, _ = run_of("swap measured", 1.0)
+    samples, data = trace.samples.copy(), resolved(trace.scenario)
+    samples.loc[10, f"{trace.ugvs[0]}.seen_x_m"] += 0.05
+    far = safety.safe_hyp(Run("a", data, trace.events, trace.states, samples))
+    control = data["control"] | {"avoidance_gain_1_s": 0.1}
+    slow = safety.safe_hyp(Run("a", data | {"control": control}, trace.events, trace.states, trace.samples))
+    rules = [found.because.rule for found in (far, slow) if found.because is not None]
+    assert rules == ["error of the measured position", "gain for errors"]
 
 
 def refuted_for(trace: Trace, states: pd.DataFrame) -> str:

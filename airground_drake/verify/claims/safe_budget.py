@@ -28,10 +28,7 @@ class SafeBudget(TheoremClaim):
 
     id = "SAFE-BUDGET"
     subject = "distance budget"
-    summary = (
-        "The law keeps the safe distance plus what turning, lags, delays and errors of measured positions cost, so "
-        "bodies keep the safe distance."
-    )
+    summary = "The law adds what turning, lags, delays and errors of positions cost, so bodies keep the safe distance."
     statement = (
         "Where the points that the law steers keep the law's distance d_law at the samples, the bodies of robots that "
         "turn, lag, get their commands late or have a plant of the user's own keep the safe distance d at all times, "
