@@ -43,7 +43,7 @@ def checked(trace: Trace, states: pd.DataFrame) -> Run:
     return Run("a", resolved(trace.scenario), trace.events, states, trace.samples)
 
 
-@pytest.mark.parametrize(("name", "duration_s"), (*RUNS, ("swap measured", 8.0)))
+@pytest.mark.parametrize(("name", "duration_s"), [*RUNS, ("swap measured", 8.0)])
 def test_the_checker_comes_to_the_same_verdicts(name: str, duration_s: float) -> None:
     trace, run = run_of(name, duration_s)
     for robot in run.robots:
