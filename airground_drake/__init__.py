@@ -9,8 +9,6 @@
 `python -m airground_drake.report case_a` do everything.
 """
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

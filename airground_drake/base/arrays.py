@@ -1,7 +1,5 @@
 """The array type of all computations."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

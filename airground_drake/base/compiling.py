@@ -1,7 +1,5 @@
 """numba's `njit` for functions that are compiled once and kept, or anew in each process where nothing can be kept."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from contextlib import suppress

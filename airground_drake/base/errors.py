@@ -1,7 +1,5 @@
 """Exceptions of the package; messages name the fault, its place and the allowed values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import PurePath

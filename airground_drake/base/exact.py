@@ -1,7 +1,5 @@
 """Numbers of a scenario as they are written."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from functools import lru_cache
 

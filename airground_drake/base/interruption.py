@@ -8,8 +8,6 @@ killed, the parent kills its descendants, removes its temporary files, and says 
 gets SIGTERM.
 """
 
-from __future__ import annotations
-
 import ctypes
 import fcntl
 import io

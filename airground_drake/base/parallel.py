@@ -4,8 +4,6 @@ A piece sees everything that existed before the first piece began; only its resu
 pieces, one after the other, which share imports and loaded data.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """Progress of long work: its stages, their finished shares, and the times of their parts."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

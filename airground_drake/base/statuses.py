@@ -1,7 +1,5 @@
 """Verdicts of claims, expectations, and whether a verdict meets an expectation."""
 
-from __future__ import annotations
-
 from typing import Literal, get_args
 
 Status = Literal["proved", "holds", "supported", "refuted", "inconclusive", "error", "not_run"]  # verdict of a claim

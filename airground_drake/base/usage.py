@@ -1,7 +1,5 @@
 """The values that options of commands take, and how a command refuses."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

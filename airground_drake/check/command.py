@@ -1,7 +1,5 @@
 """The command line of the checker. It imports what checks need only when there is something to check."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

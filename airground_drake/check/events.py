@@ -1,7 +1,5 @@
 """Arrivals and collisions: they follow from the positions of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Strict reading of the files of a report, which may be hostile: regular files in the folder, of bounded size."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Limits of the work that a hostile report can cause: sizes of a scenario, and CPU time."""
 
-from __future__ import annotations
-
 import math
 import signal
 import threading

@@ -11,8 +11,6 @@ A user's plant is a class that is not here. Its drift and its cover are declared
 is compared with the recorded places.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

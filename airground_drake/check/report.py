@@ -1,7 +1,5 @@
 """All checks of a report, a line each."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence

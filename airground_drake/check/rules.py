@@ -3,8 +3,6 @@
 A rule is a call of `same`, `close` or `holds` with a name, the recorded and the recomputed value.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """A recorded run: it belongs to the run of the scenario, is complete, and obeys its law of motion."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

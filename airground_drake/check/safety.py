@@ -4,8 +4,6 @@ Beside an obstacle that is expected to move at most at V the passive law is in f
 D >= d + V h, else n.v >= 0. It is the other inequality with d + V h in place of d, and without a gain.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from fractions import Fraction

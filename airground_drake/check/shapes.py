@@ -7,8 +7,6 @@ is minus the depth. From several parts it is the least.
 The signed distance is a convex function of the place, and changes by no more than the place moves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction

@@ -3,8 +3,6 @@
 THR-QUALITY: the same triggers against the task error without noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise, zip_longest

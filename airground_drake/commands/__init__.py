@@ -5,8 +5,6 @@ Leaves: files, lines of text, an exit code.
 May import: `base`, `check`, `model`, `uav`, `ugv`, `scenario`, `sim`, `verify`, `report`, `study`.
 """
 
-from __future__ import annotations
-
 import argparse
 import difflib
 import sys

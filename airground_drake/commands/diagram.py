@@ -1,7 +1,5 @@
 """`airground diagram SCENARIO`: draw the diagram that a scenario's runs simulate."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`airground export DIR [RUN] --to csv|mcap`: write the runs of a report as files for other programs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 

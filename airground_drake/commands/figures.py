@@ -1,7 +1,5 @@
 """`airground figures DIR`: the figures of a report as files for a paper, with captions and tables in LaTeX."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

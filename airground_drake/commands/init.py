@@ -1,7 +1,5 @@
 """`airground init FILE`: write a scenario to start from: a small one, a copy of a shipped one, or one of a fleet."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`airground judge LOG... --scenario NAME`: judge the log of an experiment, or of another simulator."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -1,7 +1,5 @@
 """`airground list [KIND [NAME]]`: every name that a scenario or the command line can use, or all about one of them."""
 
-from __future__ import annotations
-
 import inspect
 import textwrap
 from collections.abc import Callable, Iterator, Sequence

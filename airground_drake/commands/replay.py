@@ -1,7 +1,5 @@
 """`airground replay DIR [RUN]`: show what happened in the runs of a report, from their saved traces."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """From the traces of a report to its folder: verdicts, figures, findings about the paper, files."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime

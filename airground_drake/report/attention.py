@@ -1,7 +1,5 @@
 """What needs attention in a report, each in one line."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 

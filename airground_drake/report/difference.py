@@ -1,7 +1,5 @@
 """The first value in which two traces, or two JSON values, differ."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """report.json: everything that a report says, as strict JSON; HTML and JUnit only render it."""
 
-from __future__ import annotations
-
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

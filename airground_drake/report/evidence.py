@@ -1,7 +1,5 @@
 """Evidence of a claim as tables: lists of records, records of records, and single values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What came of the runs of a report, from report.json alone. A fact here holds whatever the other facts are."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property

@@ -3,8 +3,6 @@
 A file belongs to a report by its path. No other file is removed, and none may be there unless a report is there, too.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re

@@ -4,8 +4,6 @@ Its content security policy admits only its own style sheet and script, by their
 the filter of claims, nothing else.
 """
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections.abc import Sequence
 from functools import cache

@@ -1,7 +1,5 @@
 """What the help of the UAV came to in a run: interventions, messages, avoidance meanwhile; strict JSON."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """junit.xml: one test case per claim and run, for continuous integration servers."""
 
-from __future__ import annotations
-
 import json
 import re
 import xml.etree.ElementTree as ET

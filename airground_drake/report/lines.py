@@ -1,7 +1,5 @@
 """What a program that makes a report again found: lines of JSON, which `airground check` shows."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -1,7 +1,5 @@
 """LaTeX to MathML, which browsers typeset without a network, a script or a font of ours."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from functools import cache
 from html import unescape

@@ -1,7 +1,5 @@
 """Numbers of one run that every reader asks for: distances, events, decisions, times; strict JSON."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any

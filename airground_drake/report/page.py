@@ -1,7 +1,5 @@
 """report.html from report.json, the traces and the drawing of the diagram; `rebuild` makes it again to compare."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from airground_drake.report import html, rules

@@ -1,7 +1,5 @@
 """What the list of what needs attention says of claims and robots."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

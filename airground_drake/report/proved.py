@@ -3,8 +3,6 @@
 The page is written before anything is proved, with an empty place for each line; `write` fills these places.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping

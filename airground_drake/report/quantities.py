@@ -1,7 +1,5 @@
 """Values for reading, with their units: numbers, vectors, records. Pages, LaTeX and messages of tests show them so."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@
 simulated, and no third-party code is imported. It prints what it found as JSON lines, which `airground check` shows.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import sys

@@ -5,8 +5,6 @@ A measure is a pure function of a trace and a robot. It returns its components i
 never reproduced.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

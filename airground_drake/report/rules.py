@@ -3,8 +3,6 @@
 No other file of a report names a claim. A cell takes the first row of its table that applies.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 

@@ -3,8 +3,6 @@
 Each cell is a mark and short lines; each line is one fact and needs no other line. The tables are in `rules`.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The marks of lines, and how lists and numbers are put into words."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeVar

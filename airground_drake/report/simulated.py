@@ -5,8 +5,6 @@
 chaos makes other events. So a difference is "not reproduced here", and proves nothing by itself.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence

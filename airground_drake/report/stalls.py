@@ -1,7 +1,5 @@
 """Where UGVs stood in a run short of their targets, and which bodies held them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The environment in which every page's template is rendered."""
 
-from __future__ import annotations
-
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 

@@ -1,7 +1,5 @@
 """The first screen of a report as text for a terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from textwrap import wrap
 

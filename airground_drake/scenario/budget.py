@@ -1,7 +1,5 @@
 """The distance budget of a scenario: for each pair the distance promised, that in the law, and what each term costs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from itertools import combinations
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The motion of an obstacle that moves, from its waypoints."""
 
-from __future__ import annotations
-
 import math
 from itertools import chain, cycle, pairwise
 

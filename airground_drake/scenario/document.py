@@ -4,8 +4,6 @@ Scalars are read by the rules of YAML 1.2 (`1e-3` is a number, `yes` and `1:30` 
 (`<<`) and templates under top-level keys that begin with an underscore work as in Drake's own files.
 """
 
-from __future__ import annotations
-
 import difflib
 import io
 import itertools

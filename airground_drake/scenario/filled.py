@@ -1,7 +1,5 @@
 """Dataclasses filled with the data of a document by pydantic; every mistake becomes one line."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pydantic import ValidationError

@@ -4,8 +4,6 @@ Each start, target and obstacle lies at a random place near the middle of its ow
 can pass between any two. Every UGV goes straight to the second cell ahead; some UGVs have an obstacle in their way.
 """
 
-from __future__ import annotations
-
 import math
 import random
 

@@ -1,7 +1,5 @@
 """Help for a file that is refused: mistakes in YAML in plain words, and what to write where no key exists."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Scenarios made from BARN's Gazebo worlds, ROS maps and MovingAI's benchmarks."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -4,8 +4,6 @@ It states types, units, defaults, bounds and allowed names, key by key. `validat
 may refuse a file that the schema accepts, never the other way round (with merge keys expanded).
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import inspect

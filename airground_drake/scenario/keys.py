@@ -1,7 +1,5 @@
 """Every key of a scenario file, what is allowed there and what it means, from the JSON Schema."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -4,8 +4,6 @@
 checks the data against the dataclasses of `schema.py` and builds them. `validate.py` checks how values go together.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

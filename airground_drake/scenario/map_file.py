@@ -1,7 +1,5 @@
 """Maps in the files of ROS's `map_server`: a YAML file and the image that it names."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a scenario says that is allowed and seldom meant, in words for the person who wrote it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What commands take: a table of the options that several of them have, and how a command lists its own."""
 
-from __future__ import annotations
-
 import argparse
 import difflib
 from collections.abc import Callable, Collection, Mapping

@@ -1,7 +1,5 @@
 """The convex parts of an obstacle as outlines: see `model.geometry.outline`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from airground_drake.base.arrays import Array

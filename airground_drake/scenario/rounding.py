@@ -3,8 +3,6 @@
 A scenario is accepted only if the bound stays below `TOLERANCE_M`. Reports measure what a run lost.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The convex parts of an obstacle: their corners in the world frame."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

@@ -4,8 +4,6 @@
 the first. Plug-ins that a scenario names are not imported here.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Collisions among the events of a run. No package is imported: command lines that start quickly need this."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

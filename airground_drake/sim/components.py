@@ -1,7 +1,5 @@
 """Factories: each makes one part of the diagram from a scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (pre
 `optimisation` (gatekeeper) and `vehicles` (commands, disturbances, plants), whose positions are fed back.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType

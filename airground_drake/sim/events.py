@@ -3,8 +3,6 @@
 A UGV that has executed a proposal for as long as it was accepted is on its own again: `over`. It has refused nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

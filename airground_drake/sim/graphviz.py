@@ -4,8 +4,6 @@ In the picture of a scenario's diagram the paper's layers are clusters with thei
 layer is drawn as one, and the blocks stand in a fixed order. All else is Drake's text.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import sys

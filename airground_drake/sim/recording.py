@@ -1,7 +1,5 @@
 """The tables of a trace, made from a log of the diagram's outputs and from what planner and gatekeepers remember."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain

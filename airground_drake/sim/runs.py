@@ -4,8 +4,6 @@ So the routes and tasks of a scenario cannot touch the process in which verdicts
 that ends its process.
 """
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """Runs a model with Drake's Simulator and turns its log into a Trace."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence

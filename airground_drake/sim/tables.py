@@ -1,7 +1,5 @@
 """The tables of a trace other than `states` and `samples`: their columns."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any

@@ -37,8 +37,6 @@ chose, which is held until the next sample.
                                               from the straight line of that point at most, at the rows
 """
 
-from __future__ import annotations
-
 import io
 import json
 import re

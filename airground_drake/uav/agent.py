@@ -1,7 +1,5 @@
 """The policy through which the agent of a step-wise environment proposes: see `environments`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from airground_drake.model.geometry.motion import Motion

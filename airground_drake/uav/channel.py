@@ -4,8 +4,6 @@ The fate of a message is a function of the seed, the link, and the message's kin
 state is kept, a value may be computed twice, and a run with another delay loses the same messages.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from bisect import bisect_right

@@ -1,7 +1,5 @@
 """The coordinate policy: a joint plan for the triggered UGVs and for UGVs in their way."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

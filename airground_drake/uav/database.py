@@ -3,8 +3,6 @@
 The planner calls `plan` for a UGV that needs a proposal, and `after_refusal` when a UGV has refused one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The detour policy: the shortest path back to the preset, round known obstacles and bodies that stand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which UGVs stand still: at every instant the planner notes where and when each UGV came to a halt."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -7,8 +7,6 @@ The report lists the obstacles that the UGV sensed when it decided, and the reas
 Each part of a joint plan is executed as soon as its own UGV accepts it. A refusal makes the UAV withdraw the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 

@@ -4,8 +4,6 @@ A proposal is repeated until an answer names it or a newer one; a withdrawal, un
 the proposal, or gets another one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self

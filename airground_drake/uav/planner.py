@@ -4,8 +4,6 @@ It first reads the UGVs' answers: it learns obstacles from their reports, and wi
 or no longer needed. Then it asks the behaviour database for a proposal to every triggered UGV that needs one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

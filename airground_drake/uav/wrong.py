@@ -1,7 +1,5 @@
 """Wrong interventions, as a UAV proposes them under occlusion, noise, a stale map or malice."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From a solved problem to the UGV's answer to a proposal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple

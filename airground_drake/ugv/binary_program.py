@@ -1,7 +1,5 @@
 """(26) of one UGV as a mixed-integer quadratic program, positions eliminated; with shares of accepting it is (27)."""
 
-from __future__ import annotations
-
 import functools
 import threading
 

@@ -1,7 +1,5 @@
 """Limits of solving one problem: counted work in simulation, a clock in real time."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -5,8 +5,6 @@ without evaluating it, and must change with it: the quadratic costs of `binary_p
 `relaxation` the weak duality of `dual_bound` and the unavoidable task error of `unavoidable_cost`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

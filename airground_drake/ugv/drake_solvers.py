@@ -1,7 +1,5 @@
 """Solvers of Drake on a `BinaryProgram`, chosen by name."""
 
-from __future__ import annotations
-
 import math
 import time
 from dataclasses import dataclass

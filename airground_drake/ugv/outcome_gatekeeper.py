@@ -11,8 +11,6 @@ Each UGV judges its own part of a joint plan, and executes it when it accepts.
 Safety does not rest on this: an accepted motion is executed below the avoidance inequalities.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from time import thread_time

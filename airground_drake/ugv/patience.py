@@ -9,8 +9,6 @@ been on its own for `rest` s. So between two rests no UAV, whatever it sends, ke
 than `most * longest` s plus one sampling period per try, in which the UGV notices the end.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 

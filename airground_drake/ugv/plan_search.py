@@ -1,7 +1,5 @@
 """Good plans for (26) by its own cost (25), with exact distances: beam search and local search, no solver."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Why proposals are accepted and refused: the reasons, and what they mean in words."""
 
-from __future__ import annotations
-
 from typing import Literal, NamedTuple
 
 # Reasons of answers: see `answer.settle` for method (c), `outcome_gatekeeper` for method (d).

@@ -5,8 +5,6 @@ and are never optimistic. At the end of a stage any plan, relaxed or not, is in 
 smaller and of the larger mode velocity.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

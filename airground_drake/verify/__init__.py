@@ -14,8 +14,6 @@ and measure it in the run; `check` has both again.
 about the model share. `engines/` computes for them and imports no claim. `proofs/` and `coq/` have the theorems.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

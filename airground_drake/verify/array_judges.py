@@ -12,8 +12,6 @@ cannot tell, or what is so near to a limit that rounding could decide, they leav
 Robots move as they are told, and everything is there all the time; other runs have no findings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import Any
 

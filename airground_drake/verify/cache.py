@@ -6,8 +6,6 @@ a damaged entry only costs time. An entry that somebody forged together with its
 docs/verification.md.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

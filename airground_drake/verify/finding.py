@@ -1,7 +1,5 @@
 """What a check found: a status, a margin, the evidence, a chart."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass

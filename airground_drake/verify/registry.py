@@ -4,8 +4,6 @@
 scenario adds its own under `claims`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from functools import cache
 from typing import TypeVar, get_type_hints

@@ -1,7 +1,5 @@
 """All bodies of a scenario in one order, and who keeps what distance from whom."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -3,8 +3,6 @@
 Obstacles are rows of numbers, see `model.geometry.outline`. Results are those of IEEE arithmetic in the order written.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

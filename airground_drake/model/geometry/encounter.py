@@ -1,7 +1,5 @@
 """The least distance of a way from a convex core, over continuous time; compiled."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from airground_drake.base.arrays import Array

@@ -1,7 +1,5 @@
 """`Motion.at` compiled, for controllers: `motion.py` itself is loaded by the processes of policies, without numba."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from airground_drake.base.arrays import Array

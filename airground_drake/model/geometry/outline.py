@@ -20,8 +20,6 @@ Distances are signed: inside a core they are minus the depth. The signed distanc
 theorem of set-based avoidance needs nothing else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -11,8 +11,6 @@ All points are in one planar frame, in m; angles are in rad. The private functio
 number x + iy.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from dataclasses import dataclass, field, replace

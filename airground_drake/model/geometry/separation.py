@@ -6,8 +6,6 @@ overlap: every closed way can be drawn along straight legs between these points,
 convex. So it is enough to walk through the overlapping obstacles and count crossings, odd or even.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

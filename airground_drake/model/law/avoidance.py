@@ -20,8 +20,6 @@ allows. D and d are distances of the robot's centre from the *core* of
 what it avoids (`model.geometry.outline`): `World` puts both radii into d.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, get_args
 

@@ -5,8 +5,6 @@ numba compiles an expression of whole arrays several times as long as a loop. No
 arithmetic in the order written.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The null-space-based behavioural control (NSBC) task, eqs (1)-(4), vectorised over robots."""
 
-from __future__ import annotations
-
 import abc
 import math
 

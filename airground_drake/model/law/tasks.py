@@ -4,8 +4,6 @@ The UAV's controller runs the task it is given, by default `FormationTask`. The 
 written out: distances (7)-(8) as inequalities (`kernels.py`), tracking (6) and the intervention (14) (`law.py`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from airground_drake.base.arrays import Array

@@ -22,8 +22,6 @@ A' = A. Of two robots one may have to stand, because measured inequalities contr
 the law with A' = A / 2 (theorem Budget.one_stands).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -18,8 +18,6 @@ if R |b| <= l a (theorem Turning.car). The law takes that as one or two more ine
 other tasks come first, or inequalities contradict each other, a command outside makes it stand.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ deviation in m, drift in m/s, noise intensity in m/sqrt(s). The paper's (17)-(18
 deviation divided by the drift, that is in seconds; its (19) has the right-hand side upside down.
 """
 
-from __future__ import annotations
-
 import math
 
 

@@ -4,8 +4,6 @@
 scenarios or on formulas alone: `python -m airground_drake.report audit`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@
 code named for an equation names the equation in its documentation.
 """
 
-from __future__ import annotations
-
 from typing import Literal, NamedTuple
 
 Kind = Literal["faithful", "changed", "not realised"]

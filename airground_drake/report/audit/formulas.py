@@ -1,7 +1,5 @@
 """Findings about the tasks, their composition and the optimal control problem, from the paper's formulas alone."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The form of a finding about the paper."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The paper's gatekeeper by the letter, (27)-(29), and how its answers turn on what the paper leaves open."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Findings about statements of the paper that its formulas or numbers do not support."""
 
-from __future__ import annotations
-
 from itertools import product
 from math import dist
 

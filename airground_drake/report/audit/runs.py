@@ -1,7 +1,5 @@
 """Findings about the paper that the runs of a report show (numbered as in docs/paper.md)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise

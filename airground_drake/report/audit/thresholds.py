@@ -1,7 +1,5 @@
 """Findings about the drift-diffusion model, its threshold and its trigger, (15)-(20) and Table 1; each is computed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

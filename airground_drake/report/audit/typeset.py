@@ -1,7 +1,5 @@
 """The formulas of the findings about the paper as LaTeX, as printed and corrected."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

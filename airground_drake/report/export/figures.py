@@ -1,7 +1,5 @@
 """The figures of a report as files for a paper, with captions and tables in LaTeX."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tables of a report in LaTeX, with the package booktabs: its verdicts, and what it reproduces of the paper."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from airground_drake.base.statuses import NOT_EXERCISED, outcome

@@ -1,7 +1,5 @@
 """A run as CSV files, one per table of the trace."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

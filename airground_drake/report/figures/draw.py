@@ -4,8 +4,6 @@ Each figure is a row of panels, separate drawings that a page can stack on a pho
 panel. Each panel has a table of its data.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

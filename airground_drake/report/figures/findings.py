@@ -1,7 +1,5 @@
 """Pictures of findings about the paper: that of 1 from the runs, each other from its evidence in report.json alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

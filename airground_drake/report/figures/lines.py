@@ -1,7 +1,5 @@
 """The picture of a chart: named lines and marked points."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Maps of runs, each a matplotlib Figure; call them inside `canvas.style`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
 from typing import Any, NamedTuple

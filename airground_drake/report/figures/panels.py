@@ -1,7 +1,5 @@
 """A figure of a report: panels of inline SVG, each with a table of its data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Drawings over time, each a matplotlib Figure; call them inside `canvas.style`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Serve replays to the browsers of this machine."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Callable, Sequence
 from functools import cache

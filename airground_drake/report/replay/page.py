@@ -1,7 +1,5 @@
 """A replay as one HTML file that works offline: Meshcat's own page, with names, states, events and a time slider."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from typing import Any

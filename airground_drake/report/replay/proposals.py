@@ -1,7 +1,5 @@
 """The state of each proposal of a run over time, from the trace."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
 

@@ -1,7 +1,5 @@
 """A scene as a Meshcat recording: robots move and change with their state, and proposals come and go."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 from pydrake.geometry import Meshcat, MeshcatAnimation

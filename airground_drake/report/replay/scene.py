@@ -1,7 +1,5 @@
 """All that a replay shows: positions and states of the robots at each frame, proposals and events, from the trace."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

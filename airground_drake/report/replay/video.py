@@ -1,7 +1,5 @@
 """A replay seen from above as a video: animated WebP, or MP4 where ffmpeg is installed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CalledProcessError

@@ -1,7 +1,5 @@
 """Shared by all figures: looks that do not rely on colour, labels beside the data, reproducible SVG."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

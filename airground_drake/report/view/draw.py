@@ -1,7 +1,5 @@
 """Draw a scenario in Meshcat."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shapes and views of a replay: pure geometry."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise

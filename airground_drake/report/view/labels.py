@@ -1,7 +1,5 @@
 """Places labels beside their points, clear of each other and of lines and points."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 from collections.abc import Sequence

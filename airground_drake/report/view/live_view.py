@@ -1,7 +1,5 @@
 """A system that shows the robots in Meshcat while they are simulated."""
 
-from __future__ import annotations
-
 from pydrake.common.value import Value
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RollPitchYaw

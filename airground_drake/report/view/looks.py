@@ -1,7 +1,5 @@
 """Colours and marks of a replay. A mark or a dash repeats what a colour says."""
 
-from __future__ import annotations
-
 STATE_COLORS = ("#0060a8", "#d98200", "#00705a")
 STATE_MARKS = ("", "▲", "◉")  # by index of `stage.STATES`; the marks stand beside a robot's name
 

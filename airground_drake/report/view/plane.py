@@ -3,8 +3,6 @@
 Figures of reports, replays and notebooks are drawn inside `canvas.style`, which gives them the same looks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 

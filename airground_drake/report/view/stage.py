@@ -1,7 +1,5 @@
 """The robots and obstacles of a scenario, as large as they are drawn."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -4,8 +4,6 @@ Styles become presentation attributes. They work under a content security policy
 style sheet can replace each colour on a dark page.
 """
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ET
 

@@ -1,7 +1,5 @@
 """Images of maps as ROS writes them: which cells are occupied, free or unknown."""
 
-from __future__ import annotations
-
 import io
 import warnings
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Maps and scenarios of MovingAI's benchmarks, https://movingai.com/benchmarks."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

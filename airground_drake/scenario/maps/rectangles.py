@@ -1,7 +1,5 @@
 """Occupied cells as few rectangles, which may overlap."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

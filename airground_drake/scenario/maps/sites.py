@@ -1,7 +1,5 @@
 """Where robots can start and end on a map: far from obstacles, far from one another, with a way between them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The scenarios that come with the package: their files and titles, by name."""
 
-from __future__ import annotations
-
 import shlex
 from importlib import resources
 from importlib.resources.abc import Traversable

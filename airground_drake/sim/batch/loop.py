@@ -10,8 +10,6 @@ All is bit by bit as in Drake. So nothing here may be summed in another order, c
 must be that of the C library.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ first set of numbers is drawn by SetRandomContext and thrown away. Other standar
 `gaussians` asks Drake itself where a first look finds a difference.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -4,8 +4,6 @@ What a link delivers is computed from its state, its input and the time; the upd
 same. So a link without delay and loss delays nothing, not even by a period.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 

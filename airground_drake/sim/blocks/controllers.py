@@ -5,8 +5,6 @@ before the discrete ones. So the controllers' updates must stay discrete, and th
 unrestricted.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

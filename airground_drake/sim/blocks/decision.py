@@ -1,7 +1,5 @@
 """The decision layer: the decision variable of (15) and the event trigger (20)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import pairwise

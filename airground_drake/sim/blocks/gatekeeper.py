@@ -1,7 +1,5 @@
 """The UGVs' side of an intervention: accept or refuse (methods (c), (d)), or always accept (method (b))."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from pydrake.common.value import AbstractValue, Value

@@ -1,7 +1,5 @@
 """The UAVs' planners: proposals for the UGVs that the trigger has flagged."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ pydrake makes systems, ports, builders and diagrams refer to each other, so that
 garbage collector cannot break this cycle for classes derived in Python.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 from weakref import ref

@@ -1,7 +1,5 @@
 """Watches commands for violations while a run is simulated."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum

@@ -1,7 +1,5 @@
 """A controller of the user's own for all UGVs: how it is made, and a check of what it commands."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any

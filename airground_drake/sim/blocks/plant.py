@@ -1,7 +1,5 @@
 """The Drake systems of plants, users' own among them, and of disturbances."""
 
-from __future__ import annotations
-
 import copy
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What robots publish of their positions, and where the UAV sees UGVs: with errors that are bounded."""
 
-from __future__ import annotations
-
 import math
 import random
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Named views of vectors in ports and Contexts, and the types of messages."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

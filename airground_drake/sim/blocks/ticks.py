@@ -1,7 +1,5 @@
 """Sampling instants of systems with different periods, equal to the last bit."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from math import isfinite
 

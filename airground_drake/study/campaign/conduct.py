@@ -1,7 +1,5 @@
 """A campaign from beginning to end: judge the draws that are not finished, store them, write the evidence."""
 
-from __future__ import annotations
-
 from collections import Counter
 from functools import partial
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """Random maps and teams: robots on both sides of a field of obstacles, walls and boxes, each with its target across."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any, ClassVar

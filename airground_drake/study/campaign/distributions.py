@@ -1,7 +1,5 @@
 """Distributions over the keys of a scenario, by their inverse distribution functions: of shares in [0, 1)."""
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Search for a violation: simulate and judge the points of the unit cube that a sampler asks for."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Objectives that a falsification minimises: the margin of a claim, or a negated time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

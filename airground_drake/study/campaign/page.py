@@ -1,7 +1,5 @@
 """campaign.html: an offline page with the evidence of a campaign; no JavaScript."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The same work for many items, on the processors of this machine or on a Dask cluster."""
 
-from __future__ import annotations
-
 import itertools
 import logging
 import uuid

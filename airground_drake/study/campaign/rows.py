@@ -1,7 +1,5 @@
 """The dataset of a campaign: a row has the verdict of a claim on a run."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from airground_drake.base.statuses import NOT_EXERCISED, outcome

@@ -1,7 +1,5 @@
 """Verdicts of array judges on a run of the loop, and what happened in it, from arrays or from a trace."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import numpy as np

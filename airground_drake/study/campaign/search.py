@@ -1,7 +1,5 @@
 """Samplers, which choose points of the unit cube: at random, evenly, or by CMA-ES."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from typing import Any, Protocol, runtime_checkable

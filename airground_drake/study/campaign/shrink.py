@@ -3,8 +3,6 @@
 Greedy: each change is kept if the scenario is still valid and still fails, until no change is left.
 """
 
-from __future__ import annotations
-
 import copy
 import itertools
 from collections.abc import Callable, Iterator

@@ -12,8 +12,6 @@ course: {ugvs: [1, 4]}        # random maps and teams: see `course.Course`
 claims: [SAFE-TRACE]          # default: all claims about runs
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace

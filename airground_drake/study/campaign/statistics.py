@@ -4,8 +4,6 @@ k of n independent runs violated a claim. Both intervals contain the probability
 confidence: the first for an n fixed beforehand, the second for all n at once, so that a campaign may stop at any time.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

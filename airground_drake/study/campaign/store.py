@@ -9,8 +9,6 @@ killed between the two, the same draws are in both, and the part counts. A torn 
 carry a digest of the campaign and of all rows of the draw: changed, repeated or removed rows are refused.
 """
 
-from __future__ import annotations
-
 import fcntl
 import io
 import json

@@ -1,7 +1,5 @@
 """`sweep`: the runs of a scenario for every combination of values of some keys, as a table."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from itertools import chain

@@ -1,7 +1,5 @@
 """The runs of a campaign as one table, and what became of them by the value of a key that is swept."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """What one imperfection costs: distances in the law, and arrivals, by the value of a key."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from typing import Any
 

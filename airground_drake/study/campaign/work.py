@@ -1,7 +1,5 @@
 """One draw of a campaign: simulate its scenario, judge its runs, turn the verdicts into rows."""
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import json

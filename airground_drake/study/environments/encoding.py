@@ -1,7 +1,5 @@
 """Observations and proposals as arrays of numbers, for agents and for the policies that they become."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A run that stops at each request for a proposal, until it is given one."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from dataclasses import replace

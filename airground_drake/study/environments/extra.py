@@ -1,7 +1,5 @@
 """The packages of the extra `gym`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """A Gymnasium environment: one agent proposes for all UGVs, one request after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

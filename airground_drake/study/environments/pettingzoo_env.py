@@ -1,7 +1,5 @@
 """A PettingZoo parallel environment: each UGV has an agent that proposes for it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The reward: time that UGVs are away from their targets."""
 
-from __future__ import annotations
-
 from airground_drake.study.environments.episode import Episode
 
 

@@ -1,7 +1,5 @@
 """Where the episodes of an environment come from: one scenario, or the draws of a campaign; the present episode."""
 
-from __future__ import annotations
-
 import copy
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence

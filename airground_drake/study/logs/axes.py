@@ -1,7 +1,5 @@
 """Axes of a log. A scenario's x and y are in the plane, and z is up; other axes are recognised, or asked for."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """MCAP files and ROS bags. The packages that read them are extras: where one is missing, one line names it."""
 
-from __future__ import annotations
-
 import bz2
 import io
 import json

@@ -6,8 +6,6 @@ each interval counts with its own length h: n.(own step - other's step) >= A h (
 it lacks e_k, the deficit below d obeys deficit <= (1 - A h) deficit + e_k, by the induction of the safety theorem.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -3,8 +3,6 @@
 A message may be an object with attributes (ROS, protobuf) or a dict (JSON).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple

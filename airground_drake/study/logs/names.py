@@ -1,7 +1,5 @@
 """Which body of a scenario a name in a log is about."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Mapping
 

@@ -1,7 +1,5 @@
 """What a file of a log is, by its content; its streams."""
 
-from __future__ import annotations
-
 import stat
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A judged log as a page like a report's: verdict, map, distances over time, what holds for each pair; a replay."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path

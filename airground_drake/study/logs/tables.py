@@ -1,7 +1,5 @@
 """Tables as streams: long ones with a column that names the body, wide ones, one file per robot, TUM, Parquet."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path

@@ -3,8 +3,6 @@
 Guessing from the first lines goes wrong where a header of several lines, or comments, stand above the data.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Streams joined to one track per body: in one frame, in the order of time, split where a body was not recorded."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise

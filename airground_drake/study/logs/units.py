@@ -1,7 +1,5 @@
 """Units that a log leaves open, from what it says: stamps since 1970, and motion that the scenario makes impossible."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What is said of a judged log, as lines: the verdict first, then what it rests on."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from airground_drake.check.rules import SMALL

@@ -9,8 +9,6 @@
 scenarios for Hypothesis. These two need pytest and hypothesis.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

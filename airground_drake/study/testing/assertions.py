@@ -1,7 +1,5 @@
 """Claims as assertions: a failure says in words what was claimed, what was found, and what was needed."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The scenario that a test names."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

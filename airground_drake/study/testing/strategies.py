@@ -16,8 +16,6 @@ robots and obstacles, plainer shapes, shorter runs, and the defaults of the sche
         assert_holds(simulate(scenario, run), "SAFE-TRACE", "SAFE-HYP")
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """A verdict in words, for the output of a failed test."""
 
-from __future__ import annotations
-
 from airground_drake.base.files import strict
 from airground_drake.base.statuses import PASSING
 from airground_drake.report.model import Claim

@@ -8,8 +8,6 @@ the roadmap.
 Robots of several sizes share the nodes. The regions are drawn for each size, with the ways that this size can go.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple

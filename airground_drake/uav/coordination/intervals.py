@@ -3,8 +3,6 @@
 The functions are compiled by numba without fast-math: results are those of IEEE arithmetic in the order written.
 """
 
-from __future__ import annotations
-
 from heapq import heappop, heappush
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Joint plans: prioritised planning where that succeeds, a search over joint steps where it does not."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

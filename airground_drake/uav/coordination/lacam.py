@@ -8,8 +8,6 @@ a plan, and not for lack of effort, proves that no such steps lead to the target
 Effort is counted in candidates, the moves that are considered for a robot. Nothing depends on a clock.
 """
 
-from __future__ import annotations
-
 from typing import Literal, NamedTuple
 
 import numpy as np

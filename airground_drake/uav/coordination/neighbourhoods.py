@@ -5,8 +5,6 @@ of the times at which robots are back on their presets falls. The neighbourhoods
 they are back; each robot alone; a late robot and those in its way; all robots in drawn orders.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

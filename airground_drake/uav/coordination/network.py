@@ -9,8 +9,6 @@ conflict, they are in lockstep; else their moves are nowhere too near. If one wa
 near, its moves to and from there conflict with that move; so the order says that it waited there in that step, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

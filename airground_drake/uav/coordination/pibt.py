@@ -14,8 +14,6 @@ distance falls below the distance that the robots keep, or below the distance at
 less. Functions are compiled by numba.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Straighten ways: remove detours that only the roadmap causes, and keep every distance."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ A timed motion is an array (M, 3) of times, s, and places, m. It is straight bet
 place. Functions are compiled by numba without fast-math: results are those of IEEE arithmetic in the order written.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -3,8 +3,6 @@
 An array is sent as its shape and its bytes (binary64, in base64), so that every number arrives unchanged.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from dataclasses import fields

@@ -6,8 +6,6 @@ writing to the files of the kernel, such as /proc/PID/oom_score_adj. A filter of
 changing the limits, priority and processors of other processes. Other files and the network stay open to the policy.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import os

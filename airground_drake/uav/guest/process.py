@@ -4,8 +4,6 @@ The process is a fresh interpreter (`worker.py`), started once and kept. It shar
 sends JSON of bounded length, which is decoded and checked here.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -4,8 +4,6 @@
 checks every message, and accepts only a well-formed one in time.
 """
 
-from __future__ import annotations
-
 import os
 from contextlib import suppress
 from multiprocessing.connection import Connection

@@ -1,7 +1,5 @@
 """What every route does before and after its own work."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from airground_drake.base.arrays import Array

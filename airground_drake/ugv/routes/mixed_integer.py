@@ -1,7 +1,5 @@
 """(26) with its binary variables: a proven optimum along half-planes, and a search by its own cost."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The paper's route by the letter: (27) by multiple shooting, solved as a nonlinear program, then (28)-(29)."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -3,8 +3,6 @@
 The positions are eliminated, which is equivalent to multiple shooting; `nonlinear` is (27) by the letter.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from airground_drake.ugv.binary_program import Programs

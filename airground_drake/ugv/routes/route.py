@@ -1,7 +1,5 @@
 """The contract of a solution route, built in or added from outside."""
 
-from __future__ import annotations
-
 from typing import Protocol, runtime_checkable
 
 from airground_drake.ugv.budget import Budget

@@ -4,8 +4,6 @@ A decision's problem is convex once its plan is relaxed and its distances are me
 and convexity gives bounds that need no trust in any solver: see `convex_bounds.enclose`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property

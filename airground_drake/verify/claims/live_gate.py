@@ -1,7 +1,5 @@
 """LIVE-GATE: an accepted intervention is not reversed without news, and ends in time (coq/Patience.v)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """LIVE-GOAL: where the robots of a run ended. For a robot that collides, the run ends there."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 

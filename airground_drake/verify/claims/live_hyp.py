@@ -1,7 +1,5 @@
 """LIVE-HYP: a run meets the hypotheses of LIVE-WAIT and LIVE-GATE (coq/Patience.v)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any

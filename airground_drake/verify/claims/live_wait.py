@@ -1,7 +1,5 @@
 """LIVE-WAIT: no UAV keeps a UGV from its own task for longer than a bound (coq/Patience.v)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

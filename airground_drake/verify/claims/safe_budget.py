@@ -1,7 +1,5 @@
 """SAFE-BUDGET: bodies that are not where the law steers them keep their distances if the steered points keep theirs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any

@@ -4,8 +4,6 @@ Every robot moves with v + e(t), ||e(t)|| <= w, instead of v; W is what the dist
 an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction

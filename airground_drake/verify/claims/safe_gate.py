@@ -1,7 +1,5 @@
 """SAFE-GATE: under method (d) no intervention, accepted or not, leaves the safe set (coq/Gate.v, Safety.v)."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

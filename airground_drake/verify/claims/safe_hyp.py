@@ -4,8 +4,6 @@ Exact arithmetic (`engines.shortfalls`) finds how far each step misses the avoid
 follows. The parameters of the controllers are compared with the scenario (`demands`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction

@@ -5,8 +5,6 @@ body (inside a polygon, the normal of the nearest edge), p a position, v a veloc
 the gain, h the control period, q the share of an inequality, c the closing speed and R the sensing range.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 from typing import Any
 

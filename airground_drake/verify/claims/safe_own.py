@@ -1,7 +1,5 @@
 """SAFE-OWN: what the robots themselves did to the distances of a run in which obstacles may move."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 

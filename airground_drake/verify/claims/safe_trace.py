@@ -1,7 +1,5 @@
 """SAFE-TRACE: the distances of a run, over continuous time."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from functools import partial
 

@@ -1,7 +1,5 @@
 """THR-CHOICE: whether the threshold in force is the right one for the scenario's own numbers, and for its runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any

@@ -6,8 +6,6 @@ comparisons (Bonferroni): Clopper-Pearson for error rates, normal for times. The
 everything else can be redone by hand.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass

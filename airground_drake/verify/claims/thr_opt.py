@@ -1,7 +1,5 @@
 """THR-OPT: the Bayes threshold as the minimiser of the Bayes risk (16) (coq/Threshold.v)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any

@@ -16,8 +16,6 @@ hysteresis; there w is zeta / 2. A trigger is
 An excursion that ends without a trigger, or lasts to the end of the run, is *missed* if e exceeds zeta + w in it.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence

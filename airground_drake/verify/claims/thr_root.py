@@ -1,7 +1,5 @@
 """THR-ROOT: the Bayes threshold as the one root of (19) (coq/Threshold.v), enclosed by two signs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any

@@ -1,7 +1,5 @@
 """ZENO-PROOF: two triggers are never closer than the minimum inter-event time (coq/Trigger.v)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

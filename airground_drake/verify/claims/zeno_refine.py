@@ -14,8 +14,6 @@ counts. 'inconclusive': an interval is wider than 1/5, or only the bare counts a
 some dt. Else 'refuted'. The margin is the smallest distance of an interval's end from breaking the rule.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """ZENO-TRACE: the times between the triggers of a run."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 

@@ -19,8 +19,6 @@ Positions and corners are doubles, which are rational numbers, and so is the nea
 of a core: only square roots are enclosed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from math import inf, isqrt, nextafter

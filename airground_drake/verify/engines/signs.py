@@ -4,8 +4,6 @@ With u = 2 zeta drift / noise^2, k = noise^2 / drift^2 (s) and r = c2 / c1 (s), 
 on the right is f(u) = k (sinh u + u) - r = 0.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from fractions import Fraction

@@ -8,8 +8,6 @@ continuous process. So the barrier is moved inwards by 0.5826 noise sqrt(period)
 mean of the sampled time is then T + period/4.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The trigger of a scenario, read from the scenario."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from airground_drake.model.trigger.automaton import Trigger

@@ -15,8 +15,6 @@ The intensity s is that of the scenario, but at least (zeta - release) / sqrt(dw
 within a dwell: the automaton must have something to do. It is also counted at the scenario's own intensity.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Compare the folder `proofs` of a report with its traces, without Coq: the proofs must be about the recorded runs."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path

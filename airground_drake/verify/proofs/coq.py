@@ -1,7 +1,5 @@
 """Run the proof checker Coq: compile theories, list the axioms of theorems, check compiled files with `coqchk`."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

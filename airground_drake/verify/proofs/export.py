@@ -1,7 +1,5 @@
 """A recorded run as Coq files: its positions as integers, and theorems about them that Coq decides by computing."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields

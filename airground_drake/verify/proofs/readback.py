@@ -5,8 +5,6 @@ patterns. From the exporter it uses only `demands`: who keeps which distance fro
 shapes of the scenario.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from fractions import Fraction

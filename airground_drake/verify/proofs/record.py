@@ -1,7 +1,5 @@
 """The record of the last check by Coq, and whether the theories are still those that were checked."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterable, Mapping

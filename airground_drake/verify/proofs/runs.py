@@ -1,7 +1,5 @@
 """The runs of a report as theorems: one Coq file each, which Coq decides."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -7,8 +7,6 @@ A first-order robot moves on these lines. For others the theorems of Plants.v bo
 - a body with a delay alone moves on straight lines.
 """
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

@@ -5,8 +5,6 @@ LawChecker.v). A period in which it does not ends the entry. The next one starts
 its distance again. Coq decides every entry once more, and proves that it keeps its promise (`entry_keeps` in Mixed.v).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise

@@ -3,8 +3,6 @@
 The theorems themselves are in the `.v` files of this folder, for the proof checker Coq.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

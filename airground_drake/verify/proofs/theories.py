@@ -1,7 +1,5 @@
 """The package's theories, checked by the installed Coq and compared with their record."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from pathlib import Path

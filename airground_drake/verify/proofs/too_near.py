@@ -1,7 +1,5 @@
 """Which pairs of a run come too near, in exact arithmetic: Coq stops at the first pair that it refuses."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 from math import sqrt

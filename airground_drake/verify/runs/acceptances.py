@@ -1,7 +1,5 @@
 """What UGVs accepted under method (d), and for how long: the intervals that LIVE-WAIT and LIVE-GATE are about."""
 
-from __future__ import annotations
-
 from itertools import groupby, zip_longest
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 Velocities in m/s, positions in m, world frame. Nothing of the running code is used.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

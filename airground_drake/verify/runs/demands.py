@@ -4,8 +4,6 @@ They are read off the scenario and compared with those that were read back from 
 is taken from the code that builds them, so that a wrong distance there is a difference here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ motion took. The law promises less of a body that is not where the law steers it
 cover. What a body takes within that, commands already under way took.
 """
 
-from __future__ import annotations
-
 from math import ceil
 from typing import NamedTuple
 

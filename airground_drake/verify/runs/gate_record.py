@@ -3,8 +3,6 @@
 The paper's formulas are written again in plain numpy; N is the number of stages, m of the points to keep away from.
 """
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace

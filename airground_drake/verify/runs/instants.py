@@ -1,7 +1,5 @@
 """When things happened in a run: rows at times, and the intervals in which UGVs were intervened on."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -10,8 +10,6 @@ of a barrier (`engines.outlines`) or from the centre of another robot, `Pair.saf
 the points that it steers, which is more if a robot's plant takes room.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import ceil, inf
 from typing import Any, NamedTuple

@@ -4,8 +4,6 @@ A robot keeps n.v >= -(D - d - V h) / h, and n.v >= 0 where D < d + V h: it is *
 of min(D, d + V h), the obstacle has moved itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Proposals of a run, as recorded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

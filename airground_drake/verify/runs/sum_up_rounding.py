@@ -1,7 +1,5 @@
 """Sum-up rounding (28)-(29) of a recorded decision, a part of GATE-PLAN."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

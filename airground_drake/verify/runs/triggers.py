@@ -4,8 +4,6 @@ The decision variable x(t) = ||rho_rd(t) - rho(t)|| + n(t) is, between rows, the
 in time plus a number that is linear in time, so its turning points and crossings are found exactly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
