@@ -19,7 +19,7 @@ from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected
 from oracles.protocol import parts_of
-from oracles.sensing import moves, still_parts
+from oracles.sensing import moves, place_of, still_parts
 from oracles.turning import numbers_of
 
 
@@ -98,7 +98,7 @@ def scene(
     if numbers[0]:
         heading = float(np.interp(t, trace.t, trace.column(f"{on.ugv}.heading_rad")))
     return Scene(
-        here=interpolate(trace.t, trace.position(on.ugv), t),
+        here=place_of(trace, on.ugv, t),
         preset=travelled(*preset_of(trace, on.ugv), t + after),
         wanted=place(on, t + after),
         executed=np.arange(len(after) - 1) < periods,

@@ -81,13 +81,16 @@ def limited(velocity: Array, limit: Array | float) -> Array:
 
 
 def avoiding(below: Array, given: Inequalities, composition: str, *, planar: bool) -> Array:
-    """The avoidance tasks above velocities (B, 3): the closest ones, or (5) as printed for `recursion_*`."""
+    """The avoidance tasks above velocities (B, 3): the closest ones, or (5) as printed for `recursion_*`.
+
+    Where they contradict one another: those that miss the least, or for `standing` none.
+    """
     velocity = below.copy()
     missed = (given.slack(below) < 0.0).any(axis=1)
     if not missed.any():
         return velocity
     normal, bound = given.normal[missed], given.bound[missed]
-    if composition != "augmented":
+    if composition.startswith("recursion"):
         velocity[missed] = [
             _recursion(*one, nearest_first=composition == "recursion_nearest")
             for one in zip(below[missed], normal, bound, strict=True)
@@ -97,7 +100,8 @@ def avoiding(below: Array, given: Inequalities, composition: str, *, planar: boo
     level = bound + MARGIN_M_S
     found, met = closest(below[missed, :axes], normal[:, :, :axes], level)
     if not met.all():
-        found[~met] = least_violation(normal[~met, :, :axes], level[~met])
+        standing = composition == "standing"
+        found[~met] = 0.0 if standing else least_violation(normal[~met, :, :axes], level[~met])
     velocity[missed, :axes] = shortened(found, normal[:, :, :axes], bound)
     return velocity
 
@@ -138,6 +142,11 @@ def intervened(position: Array, below: Array, asked: Asked, gain: float, limit: 
     return limited(PLANE * (below + np.einsum("bij,bj->bi", asked.chosen, wish - below)), limit)
 
 
+def composed(trace: Trace) -> str:
+    """How the avoidance tasks of a run are composed; with errors of positions robots stand in contradictions."""
+    return "standing" if trace.scenario.position_error_m else str(trace.meta["composition"])
+
+
 def commanded(
     trace: Trace,
     position: Array,
@@ -158,7 +167,7 @@ def commanded(
         asked: the E interventions.
         limit: speed limits, (B,).
     """
-    composition, gain = trace.meta["composition"], trace.scenario.control.intervention_gain_1_s
+    composition, gain = composed(trace), trace.scenario.control.intervention_gain_1_s
     if trace.meta["method"] in ON_TOP:
         velocity = avoiding(retreating(own, given, limit, planar=True), given, composition, planar=True)
         velocity[rows] = intervened(position[rows], velocity[rows], asked, gain, limit[rows])

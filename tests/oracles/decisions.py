@@ -14,7 +14,7 @@ from airground_drake.scenario.schema import Gatekeeper
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.claims.gate_plan import BLOCKS, Bounded, bound, cheapest_of_blocks
-from airground_drake.verify.engines.geometry import interpolate, travelled
+from airground_drake.verify.engines.geometry import travelled
 from airground_drake.verify.engines.outlines import Cores, away_from
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.convex_bounds import Enclosure
@@ -31,7 +31,7 @@ from airground_drake.verify.runs.proposals import proposal_of, proposals_of
 from oracles.beginnings import movers
 from oracles.channel import has_channel, held
 from oracles.fault import Fault
-from oracles.sensing import sensed, still_parts
+from oracles.sensing import place_of, sensed, still_parts
 
 NO_DIFFERENCE = 1e-6
 """Relative gain from which on a new proposal makes a difference."""
@@ -107,7 +107,7 @@ def compare_situation(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
     yield Deviation(row, "weight of task errors", row.error_weight - gate.error_weight_1_m2_s, 0.0)
     yield Deviation(row, "weight of slack", row.slack_weight - gate.slack_weight_1_m2_s, 0.0)
     yield Deviation(row, "weight of the terminal cost", row.terminal_weight - gate.terminal_weight_s, 0.0)
-    own = interpolate(trace.t, trace.position(robot), t)
+    own = place_of(trace, robot, t)
     yield Deviation(row, "initial position, m", row["initial_m"] - own, POSITION_TOLERANCE_M)
     reference = travelled(*preset_of(trace, robot), t + after)
     yield Deviation(row, "reference, m", row["reference_m"] - reference, POSITION_TOLERANCE_M)

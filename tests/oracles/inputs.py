@@ -8,7 +8,6 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import (
     BASE,
     COUNT,
@@ -24,7 +23,7 @@ from airground_drake.verify.engines.outlines import (
 from airground_drake.verify.runs.acceptances import METHOD
 from airground_drake.verify.runs.proposals import proposal_of
 from oracles.fault import Fault
-from oracles.sensing import are_same, are_there, beyond_range, first_sensed, seen_gone, still_parts
+from oracles.sensing import are_same, are_there, beyond_range, first_sensed, place_of, seen_gone, still_parts
 
 MOST_CLAIMED = 64
 """Outlines of a message that a UGV takes into account."""
@@ -69,7 +68,7 @@ def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any
 
 def _told(trace: Trace, ugv: str, t: float, mapped: Array, known: Cores) -> list[int]:
     """Rows of a map that a UGV believes: outlines out of sight that it has not sensed, and the nearest ones only."""
-    here, cores = interpolate(trace.t, trace.position(ugv), t), Cores.of(mapped)
+    here, cores = place_of(trace, ugv, t), Cores.of(mapped)
     far = away_from(cores, here, planar=True).distance
     new = (far > trace.scenario.control.sensing_range_m) & ~are_same(cores, known).any(axis=1)
     sound = np.array([_is_outline(*each) for each in zip(mapped, cores.corners, strict=True)], dtype=np.bool_)

@@ -36,6 +36,14 @@ def are_there(trace: Trace, t: float | Array) -> npt.NDArray[np.bool_]:
     return np.asarray((first <= t + TIME_TOLERANCE_S) & (t < last - TIME_TOLERANCE_S))
 
 
+def place_of(trace: Trace, robot: str, t: float | Array) -> Array:
+    """Where all take a robot to be at times, s: (3,) or (K, 3), m; with errors, as it was published last."""
+    if not trace.scenario.sensing:
+        return interpolate(trace.t, trace.position(robot), t)
+    last = np.searchsorted(trace.t[trace.sample_rows], np.asarray(t) + TIME_TOLERANCE_S, side="right") - 1
+    return trace.as_seen(robot, robot)[last]
+
+
 class Sensed(NamedTuple):
     """What a UGV senses when it decides: parts of barriers, by number, and robots, each with its pair.
 
@@ -49,7 +57,7 @@ class Sensed(NamedTuple):
 
 def sensed(trace: Trace, robot: str, t: float, after: Array) -> Sensed:
     """What is within sensing range of a UGV at a time, s, with the places of robots at times `after` that."""
-    here, reach = interpolate(trace.t, trace.position(robot), t), trace.scenario.control.sensing_range_m
+    here, reach = place_of(trace, robot, t), trace.scenario.control.sensing_range_m
     pairs, places = list[Pair](), list[Array]()
     for other in trace.robots:
         place, velocity = moves(trace, other, t)
@@ -61,13 +69,13 @@ def sensed(trace: Trace, robot: str, t: float, after: Array) -> Sensed:
 
 def beyond_range(trace: Trace, ugv: str, t: float) -> Array:
     """How far each part is beyond the sensing range of a UGV at a time, s, (m,), m."""
-    here = interpolate(trace.t, trace.position(ugv), t)
+    here = place_of(trace, ugv, t)
     return away_from(still_parts(trace).cores, here, planar=True).distance - trace.scenario.control.sensing_range_m
 
 
 def moves(trace: Trace, robot: str, t: float) -> tuple[Array, Array]:
     """Where a robot is at a time, (3,), m, and its velocity up to then, (3,), m/s."""
-    return interpolate(trace.t, trace.position(robot), t), trace.command(robot)[row_at(trace, t)]
+    return place_of(trace, robot, t), trace.command(robot)[row_at(trace, t)]
 
 
 def news(trace: Trace, ugv: str, mapped: Array, begin_s: float, end_s: float) -> Indices:
@@ -116,7 +124,7 @@ def _near(trace: Trace, ugv: str) -> tuple[Array, Indices, npt.NDArray[np.bool_]
     """Times of the gatekeeper's samples, s, at which a part is within sensing range; the part; whether it is there."""
     period_s = trace.scenario.gatekeeper.period_s
     samples = period_s * np.arange(np.floor(trace.t[-1] / period_s + 1e-9) + 1.0)
-    was = interpolate(trace.t, trace.position(ugv), np.minimum(samples, trace.t[-1]))
+    was = place_of(trace, ugv, np.minimum(samples, trace.t[-1]))
     parts = still_parts(trace)
     near = within(parts.cores, was, trace.scenario.control.sensing_range_m, planar=True)
     then = np.array([are_there(trace, t) for t in samples]).reshape(len(samples), len(parts.owner))

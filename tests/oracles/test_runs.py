@@ -69,6 +69,17 @@ def test_a_run_of_a_robot_that_only_drives_ahead_has_no_fault(plant: str, compos
     assert (beyond >= -OUTSIDE_M_S).all()
 
 
+NOISY = (
+    'sensing={"position_error_m": 0.03, "errors": "away", "uav_error_m": 0.5}',
+    'channel={"delay_s": 0.3, "jitter_s": 0.2, "loss": 0.3, "duplicate": 0.3}',
+)
+
+
+@pytest.mark.parametrize("scenario", ["swap", "pocket"])
+def test_a_run_with_errors_of_positions_over_a_channel_has_no_fault(scenario: str) -> None:
+    assert not faults_of(simulate(load(scenario, [*NOISY, "duration_s=14"]), "d"))
+
+
 DOOR = """
 name: door
 duration_s: 20
