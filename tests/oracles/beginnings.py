@@ -173,6 +173,8 @@ def known_cores(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[
     theirs = np.array(
         [law_m(safe, room, None, passive=moves_) for safe, moves_ in zip(theirs.tolist(), passive, strict=True)]
     )
+    if error_m := trace.scenario.position_error_m:
+        theirs = error_m + np.hypot(theirs - room.drift_m, error_m) + room.drift_m
     safe, speed = [pair.law_m for pair in beside], [pair.speed_m_s for pair in beside]
     law = np.array([np.append(safe, theirs), np.ones(len(known) + len(told)), np.append(speed, claimed[:, SPEED])])
     return Cores.joined([parts.cores.take(known), Cores.of(claimed)]), law
