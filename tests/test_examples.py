@@ -66,7 +66,7 @@ def test_the_tests_of_a_downstream_user_under_several_workers(tmp_path: Path) ->
     made = [path.parent for path in (tmp_path / "kept" / "airground_traces").glob("*/meta.json")]
     assert sorted(path.name.rpartition("-")[0] for path in made) == ["depot-a", *4 * ["depot-d"], "minimal-a"]
     assert "LIVE-GOAL is refuted, on run a of minimal (method a, seed 0)" in done.stdout
-    assert "value: tolerance left about where a robot must end: -8.9" in done.stdout
+    assert "value: tolerance left about where a robot must end: \N{MINUS SIGN}8.9" in done.stdout
     assert "_require" not in done.stdout
 
 

@@ -138,7 +138,14 @@ def _read_s(trace: Trace, ugv: str, row: Row, told: set[int]) -> float:
         if answer["sender"] != ugv or not np.isfinite(answer["read_s"]) or order <= newest:
             continue
         newest = order
-        holds = answer["about"] == row["about"] and (order[0] in told or trace.meta["method"] == "b")
+        obeys = trace.meta["method"] == "b" and answer["sent_s"] < _dropped_s(trace, ugv, row) - TIME_TOLERANCE_S
+        holds = answer["about"] == row["about"] and (order[0] in told or obeys)
         if answer["about"] >= row["about"] and not (row["kind"] == "withdrawal" and holds):
             return float(answer["read_s"])
     return np.inf
+
+
+def _dropped_s(trace: Trace, ugv: str, row: Row) -> float:
+    """When a UGV read that the proposal of a message is withdrawn, s; infinite if never."""
+    mine = [m for m in rows_of(trace) if (m["kind"], m["receiver"], m["about"]) == ("withdrawal", ugv, row["about"])]
+    return float(np.nanmin([np.inf, *(message["read_s"] for message in mine)]))
