@@ -7,7 +7,7 @@ from pathlib import Path
 from airground_drake.base import files
 from airground_drake.scenario.load import Overrides, load, resolved, validated
 from airground_drake.scenario.schema import Scenario
-from airground_drake.sim.trace import SCHEMA
+from airground_drake.sim.tables import SCHEMA
 
 
 def chosen(scenario: str | Path | Scenario, overrides: Overrides = ()) -> Scenario:
