@@ -76,7 +76,7 @@ def _charges(scenario: Scenario) -> Problems:
             charged[ugv] = name
     without = [name for name, uav in scenario.uavs.items() if not uav.ugvs]
     if without:
-        why = f"{without[1]} has none either" if len(without) > 1 else "the others' lists have all UGVs"
+        why = f"{without[1]} has no list, too" if len(without) > 1 else "the lists of the other UAVs have all UGVs"
         yield f"uavs.{without[0]}.ugvs", Fault("missing"), f"wanted: a list of UGVs that it is in charge of: {why}"
     for ugv in scenario.ugvs if charged else ():
         if ugv not in charged:

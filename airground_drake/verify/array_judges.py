@@ -53,7 +53,7 @@ class NoScreenError(Exception):
 
 
 class ArrayJudges:
-    """Of the runs of a scenario by the loop; raises NoScreenError where it has none for them."""
+    """Judges the runs that the loop makes of a scenario; raises NoScreenError for scenarios that it cannot judge."""
 
     def __init__(self, batch: Batch) -> None:
         """Set them up: all that does not depend on the run."""
@@ -92,8 +92,8 @@ class ArrayJudges:
             "THR-TRIG": lambda: self._thr_trig(log),
             "LIVE-GOAL": lambda: self._live_goal(log),
         }
-        found = {claim: screens[claim]() for claim in claims}
-        return {claim: finding for claim, finding in found.items() if finding is not None}
+        findings = {claim: screens[claim]() for claim in claims}
+        return {claim: finding for claim, finding in findings.items() if finding is not None}
 
     def _is_a_run(self, log: Log) -> bool:
         """Whether the rows are a whole run in which every robot goes where its command leads to."""

@@ -50,7 +50,7 @@ def test_a_ugv_that_is_added_later_needs_a_uav() -> None:
     assert scenario.uavs["south"].ugvs == ["one"]
     scenario.uavs["west"] = Uav("west", start_m=[0.0, -3.0, 2.0])
     with pytest.raises(
-        ScenarioError, match=r"uavs\.west\.ugvs: missing; wanted: a list of UGVs.* the others' lists have all"
+        ScenarioError, match=r"uavs\.west\.ugvs: missing; wanted: a list of UGVs.* the lists of the other UAVs have all"
     ):
         validated(scenario)
 

@@ -30,7 +30,7 @@ class Down:
 
 
 class Downlink(LeafSystem):
-    """From a UAV to its UGVs; the UAV repeats what nobody has shown to have read.
+    """From a UAV to its UGVs; the UAV repeats a message until an answer shows that the UGV has read it.
 
     Ports: in `sent`, the planner's memory; `heard`, see `Uplink`, used by updates only; out `inbox`, all deliveries so
     far, in the order of arrival.
