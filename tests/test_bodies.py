@@ -35,7 +35,7 @@ from airground_drake.ugv.rollout import View
 from airground_drake.verify import judge
 from airground_drake.verify.engines.outlines import unpacked
 from airground_drake.verify.proofs.export import recorded
-from airground_drake.verify.proofs.too_near import too_near
+from airground_drake.verify.proofs.table import too_near
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25
 """Radii, m, whose sums are exact."""

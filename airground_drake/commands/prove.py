@@ -52,10 +52,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _theorems(*, record: bool, limit_s: float) -> int:
     """Check the package's theorems."""
-    from airground_drake.verify.proofs import theories
+    from airground_drake.verify.proofs import coq
     from airground_drake.verify.proofs.theorems import THEOREMS
 
-    checked = theories.check(limit_s=limit_s)
+    checked = coq.check(limit_s=limit_s)
     for name, theorem in THEOREMS.items():
         print(f"{name}: {theorem.statement}")
         if theorem.silent_on:
@@ -66,8 +66,8 @@ def _theorems(*, record: bool, limit_s: float) -> int:
         f"{checked.compile_s:.0f} s, checked again by coqchk in {checked.again_s:.0f} s"
     )
     if record:
-        print(theories.write_record(checked))
-    differing = theories.differences(checked)
+        print(coq.write_record(checked))
+    differing = coq.differences(checked)
     for line in differing:
         print(line)
     return EXIT_UNPROVED if differing else 0

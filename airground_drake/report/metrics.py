@@ -18,7 +18,6 @@ from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S, Way, m
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.pair_kinds import MOVING, kind_of
 from airground_drake.verify.runs.gate_record import without_decisions
-from airground_drake.verify.runs.instants import lost_at_the_end, reasons, without_proposals
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Gap,
@@ -35,6 +34,7 @@ from airground_drake.verify.runs.pairs import (
     to_barrier,
 )
 from airground_drake.verify.runs.passive import passive_pairs
+from airground_drake.verify.runs.proposals import lost_at_the_end, reasons, without_proposals
 
 MOST_OBSTACLES = 20  # maximum number of obstacles listed per robot
 NEAR_OBSTACLES, NEAR_ROBOTS = 3, 1  # numbers of obstacles and robots that count as close by

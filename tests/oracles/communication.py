@@ -9,9 +9,8 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import CORNERS, COUNT, MIDDLE, Cores
 from airground_drake.verify.runs.demands import outlines_of
-from airground_drake.verify.runs.instants import intervening
 from airground_drake.verify.runs.pairs import carried
-from airground_drake.verify.runs.proposals import proposals_of
+from airground_drake.verify.runs.proposals import intervening, proposals_of
 from oracles.channel import has_channel
 from oracles.fault import Fault
 from oracles.protocol import answers_to, known_answers, lost_s, parties, withdrawn_s

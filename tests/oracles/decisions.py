@@ -13,11 +13,10 @@ from airground_drake.base.arrays import Array
 from airground_drake.scenario.schema import Gatekeeper
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.claims.gate_plan import BLOCKS, Bounded, bound, cheapest_of_blocks
+from airground_drake.verify.claims.gate_plan import BLOCKS, Bounded, Enclosure, bound, cheapest_of_blocks
 from airground_drake.verify.engines.geometry import travelled
 from airground_drake.verify.engines.outlines import Cores, away_from
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.convex_bounds import Enclosure
 from airground_drake.verify.runs.gate_record import (
     POSITION_TOLERANCE_M,
     DecisionRecord,
@@ -25,9 +24,8 @@ from airground_drake.verify.runs.gate_record import (
     cost_tolerance,
     rows_of,
 )
-from airground_drake.verify.runs.instants import GATED_METHODS, intervening
 from airground_drake.verify.runs.pairs import pairs_beside, preset_of
-from airground_drake.verify.runs.proposals import proposal_of, proposals_of
+from airground_drake.verify.runs.proposals import GATED_METHODS, intervening, proposal_of, proposals_of
 from oracles.beginnings import movers
 from oracles.channel import has_channel, held
 from oracles.fault import Fault

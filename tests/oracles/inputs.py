@@ -20,8 +20,7 @@ from airground_drake.verify.engines.outlines import (
     Cores,
     away_from,
 )
-from airground_drake.verify.runs.acceptances import METHOD
-from airground_drake.verify.runs.proposals import proposal_of
+from airground_drake.verify.runs.proposals import METHOD, proposal_of
 from oracles.fault import Fault
 from oracles.sensing import are_same, are_there, beyond_range, first_sensed, place_of, seen_gone, still_parts
 

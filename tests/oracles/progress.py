@@ -6,9 +6,8 @@ from itertools import zip_longest
 
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.runs.acceptances import METHOD
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
-from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
+from airground_drake.verify.runs.proposals import METHOD, ProposalRecord, proposal_of
 from oracles.fault import Fault
 from oracles.protocol import held_until
 from oracles.sensing import news

@@ -8,8 +8,7 @@ import numpy as np
 
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.runs.instants import GATED_METHODS, row_at
-from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of
+from airground_drake.verify.runs.proposals import GATED_METHODS, ProposalRecord, proposals_of, row_at
 from oracles.channel import has_channel, heard, held
 from oracles.fault import Fault
 

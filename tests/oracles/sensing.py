@@ -10,8 +10,8 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import Cores, away_from, within
-from airground_drake.verify.runs.instants import row_at
 from airground_drake.verify.runs.pairs import Pair, Parts, carried, lifetimes, pairs_beside, parts_of
+from airground_drake.verify.runs.proposals import row_at
 
 SAME_M = 1e-9
 """Cores whose corners and heights differ by no more than this are one, m."""

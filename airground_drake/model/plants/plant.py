@@ -99,7 +99,7 @@ class Plant:
     cover_key: ClassVar[str] = "cover_m"
     # Theorems about it beside an obstacle that may move.
     passive_theorems: ClassVar[tuple[str, ...]] = ()
-    # Why no theorem is about a recorded run with it; '' where one is (`verify/proofs/slack.py` knows its bounds).
+    # Why no theorem is about a recorded run with it; '' where one is (`verify/proofs/export.py` knows its bounds).
     unproved: ClassVar[str] = "no theorem is about such a body"
 
     @property

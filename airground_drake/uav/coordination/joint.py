@@ -7,10 +7,9 @@ from typing import Literal
 
 from airground_drake.model.geometry.paths import NoPath, shortest_path
 from airground_drake.uav.coordination.first_plan import first_plan
-from airground_drake.uav.coordination.neighbourhoods import Refinement
+from airground_drake.uav.coordination.neighbourhoods import Refinement, smooth
 from airground_drake.uav.coordination.roadmap import RobotTask, Space, build_roadmap
 from airground_drake.uav.coordination.single import Mover, OtherRobot, Way, find, sum_of_times
-from airground_drake.uav.coordination.smoothing import smooth
 from airground_drake.uav.coordination.timed import at_rest, speed
 
 # No further order of the robots begins after so many searches for single robots, or one part in ten of the effort.

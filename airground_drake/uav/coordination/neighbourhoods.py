@@ -2,15 +2,17 @@
 
 Some ways are taken out and found anew, one after the other, each among all other ways. The new ways are kept if the sum
 of the times at which robots are back on their presets falls. The neighbourhoods are: all robots, in the order in which
-they are back; each robot alone; a late robot and those in its way; all robots in drawn orders.
+they are back; each robot alone; a late robot and those in its way; all robots in drawn orders. At last the ways are
+straightened: detours are removed that only the roadmap causes.
 """
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from airground_drake.uav.coordination.roadmap import Space
 from airground_drake.uav.coordination.single import Mover, OtherRobot, Way, find
-from airground_drake.uav.coordination.timed import distance
+from airground_drake.uav.coordination.timed import distance, straightened
 
 GAIN_S = 1e-3  # a change must lower the sum of times by more than this, s
 DRAWN = 3  # number of drawn orders in which all robots are planned for anew
@@ -94,3 +96,34 @@ class Refinement:
 
     def _body(self, i: int, way: Way) -> OtherRobot:
         return OtherRobot(way.motion, self._movers[i].task.body)
+
+
+ROUNDS = 2  # how often every way is straightened among the others
+
+
+def smooth(
+    spaces: Sequence[Space], ways: Sequence[Way | None], rests: Sequence[OtherRobot], fixed: Sequence[OtherRobot]
+) -> list[Way | None]:
+    """The ways with straight pieces where these are free."""
+    # The times at which robots join their presets do not change.
+    # ways: one per robot; None: the robot stays where it is.
+    smoothed = list(ways)
+    for _ in range(ROUNDS):
+        for i, way in enumerate(smoothed):
+            if way is None:
+                continue
+            others = [*fixed, *(_moving(other, rests[j]) for j, other in enumerate(smoothed) if j != i)]
+            smoothed[i] = _straightened(spaces[i], way, others)
+    return smoothed
+
+
+def _moving(way: Way | None, rest: OtherRobot) -> OtherRobot:
+    return rest if way is None else rest._replace(motion=way.motion)
+
+
+def _straightened(space: Space, way: Way, others: Sequence[OtherRobot]) -> Way:
+    stacked = np.concatenate([np.zeros((0, 3)), *(other.motion for other in others)])
+    begins = np.concatenate([[0], np.cumsum([len(other.motion) for other in others])]).astype(np.int64)
+    apart = np.array([space.apart + other.radius + space.spacing for other in others])
+    motion = straightened(way.motion, way.rows, space.rows, space.along, stacked, begins, apart)
+    return Way(motion, way.joined, way.rows - (len(way.motion) - len(motion)))

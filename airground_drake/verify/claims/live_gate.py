@@ -6,8 +6,8 @@ from typing import Any
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.live_wait import LiveWait
 from airground_drake.verify.model.theorem import Proof
-from airground_drake.verify.runs.acceptances import Acceptance, acceptances
 from airground_drake.verify.runs.passive import beside
+from airground_drake.verify.runs.proposals import Acceptance, acceptances
 
 
 @dataclass(frozen=True, kw_only=True)

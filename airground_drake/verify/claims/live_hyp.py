@@ -9,8 +9,8 @@ import numpy as np
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.acceptances import METHOD, Acceptance, acceptances
 from airground_drake.verify.runs.gate_record import DecisionRecord, GateClaim
+from airground_drake.verify.runs.proposals import METHOD, Acceptance, acceptances
 
 
 @dataclass(frozen=True)

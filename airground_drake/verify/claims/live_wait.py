@@ -7,7 +7,7 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
-from airground_drake.verify.runs.acceptances import below_avoidance
+from airground_drake.verify.runs.proposals import below_avoidance
 
 
 @dataclass(frozen=True, kw_only=True)

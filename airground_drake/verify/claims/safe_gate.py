@@ -8,7 +8,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.safe_inv import SafeInv
 from airground_drake.verify.model.theorem import Hypothesis
-from airground_drake.verify.runs.acceptances import below_avoidance
+from airground_drake.verify.runs.proposals import below_avoidance
 
 
 class SafeGate(SafeInv):

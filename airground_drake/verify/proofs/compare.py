@@ -11,8 +11,7 @@ from airground_drake.verify.proofs.export import distances_file, recorded, witho
 from airground_drake.verify.proofs.readback import compare
 from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, closure, digest
 from airground_drake.verify.proofs.runs import CHECKERS, FOUND, SCHEMA, expects_kept, listed
-from airground_drake.verify.proofs.table import entries, law_file, lawful, missed
-from airground_drake.verify.proofs.too_near import too_near
+from airground_drake.verify.proofs.table import entries, law_file, lawful, missed, too_near
 
 Broken = tuple[str, Any, Any]  # what is wrong, what it should be, and what is recorded
 

@@ -3,11 +3,15 @@
 import re
 import shutil
 import subprocess
+import time
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, one_line
-from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, closure
+from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, RECORD, closure, digest, file_of, read_record
+from airground_drake.verify.proofs.theorems import THEOREMS
 
 LIMIT_S = 600.0  # Wall-clock time for one call of Coq, s. The longest, `coqchk`, takes some 30 s.
 # Words with which a file could assume what it should prove, or turn off Coq's own checks.
@@ -131,3 +135,46 @@ def _run(command: list[str], folder: Path, limit_s: float) -> subprocess.Complet
         raise CoqError(f"{command[0]} {command[-1]} took longer than {limit_s:g} s") from None
     except OSError as error:
         raise NoCoqError(one_line(f"{command[0]} does not start: {error.strerror}")) from None
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What Coq found."""
+
+    coq: str  # its version
+    sha256: dict[str, str]  # of each theory
+    axioms: dict[str, list[str]]  # of each theorem
+    compile_s: float  # how long `coqc` took, s
+    again_s: float  # how long `coqchk` took, s
+
+
+def check(source: Path = FOLDER, limit_s: float = LIMIT_S) -> Checked:
+    """Compile all theories, list the axioms of all theorems, and have `coqchk` check everything again."""
+    installed = version()
+    with files.temporary_folder() as folder:
+        started = time.perf_counter()
+        theories = sorted(install(dict.fromkeys(map(file_of, THEOREMS)), folder, source, limit_s))
+        axioms = axioms_of(list(THEOREMS), folder, limit_s)
+        compiled = time.perf_counter()
+        check_again([name.removesuffix(".v") for name in theories], folder, limit_s)
+        done = time.perf_counter()
+    sha256 = {name: digest(source / name) for name in theories}
+    return Checked(installed, sha256, axioms, compiled - started, done - compiled)
+
+
+def differences(checked: Checked, source: Path = FOLDER) -> list[str]:
+    """Differences from the record, a line each. Another version of Coq does not count."""
+    record = read_record(source)
+    if record is None:
+        return [f"{RECORD} cannot be read"]
+    return [
+        f"{name} differs from its record"
+        for part, now in (("sha256", checked.sha256), ("axioms", checked.axioms))
+        for name in sorted({*record[part], *now})
+        if record[part].get(name) != now.get(name)
+    ]
+
+
+def write_record(checked: Checked, source: Path = FOLDER) -> Path:
+    files.write_json(source / RECORD, {"coq": checked.coq, "sha256": checked.sha256, "axioms": checked.axioms})
+    return source / RECORD

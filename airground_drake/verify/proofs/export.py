@@ -1,4 +1,12 @@
-"""A recorded run as Coq files: its positions as integers, and theorems about them that Coq decides by computing."""
+"""A recorded run as Coq files: its positions as integers, and theorems about them that Coq decides by computing.
+
+A first-order robot moves on the straight lines between its recorded places. For others the theorems of Plants.v bound
+what leaves these lines, from the numbers of their plants:
+
+- the axle of a unicycle runs on arcs, off their chords by |omega| |v| h^2 / 8 at most;
+- a body with lag tau accelerates by 2 V / tau at most, and is off by V h^2 / (4 tau);
+- a body with a delay alone moves on straight lines.
+"""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,13 +17,16 @@ from itertools import chain, groupby, pairwise
 from math import isqrt, lcm
 from typing import NamedTuple
 
+import numpy as np
+
 from airground_drake.base.errors import TraceError
 from airground_drake.base.exact import decimal
+from airground_drake.model.plants.budget import Bounds, law_distance
+from airground_drake.scenario.plants import bounds_of
 from airground_drake.scenario.schema import SHAPES, Obstacle, Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.pair_kinds import MOVING, apart
-from airground_drake.verify.proofs import slack
 from airground_drake.verify.proofs.coq import without_comments
 from airground_drake.verify.proofs.record import FOLDER
 from airground_drake.verify.proofs.separating import Prism, Vector, separating
@@ -186,7 +197,7 @@ def _sets(obstacle: Obstacle, core: str) -> tuple[ConvexSet, ...]:
 
 def off_m(trace: Trace, *, steered: bool = False) -> dict[str, Fraction]:
     """How far the bodies of robots may be off the straight lines between recorded places, m, if they may be."""
-    of = slack.off_steered_m if steered else slack.off_lines_m
+    of = off_steered_m if steered else off_lines_m
     return {name: of(trace, name) for name in trace.robots if trace.is_apart(name)}
 
 
@@ -197,10 +208,10 @@ def demands_of(trace: Trace, *, steered: bool = False) -> list[Demand]:
     for demand in demands(trace.scenario):
         names = [name for name in (demand.first, demand.second) if name in lines]
         if steered:
-            room = slack.law_m(trace, demand.body_m, demand.first, demand.second) - demand.body_m
+            room = law_m(trace, demand.body_m, demand.first, demand.second) - demand.body_m
         else:
             room = sum((lines[name] for name in names), Fraction(0))
-        demanded.append(demand._replace(room_m=room, late=any(slack.is_late(trace, name) for name in names)))
+        demanded.append(demand._replace(room_m=room, late=any(_bounds(trace, name).late for name in names)))
     return demanded
 
 
@@ -444,3 +455,38 @@ def real(number: Fraction) -> str:
 def ratio(number: Fraction) -> str:
     """Two arguments, numerator and denominator."""
     return f"{number.numerator}%Z {number.denominator}%Z"
+
+
+# A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
+# bound of an arc that is not attained, by far more.
+ROUNDED_M = Fraction(1, 2**45)
+
+
+def _bounds(trace: Trace, robot: str) -> Bounds:
+    """How far a robot's body may be from the point that the law steers, at its limit or fastest command, if faster."""
+    fastest = float(np.linalg.norm(trace.chosen(robot), axis=1).max())
+    return trace.plant(robot).bounds(max(trace.scenario.robots[robot].max_speed_m_s, fastest))
+
+
+def off_lines_m(trace: Trace, robot: str) -> Fraction:
+    """How far a robot's body may be off the straight lines between its recorded places, m."""
+    limits = _bounds(trace, robot)
+    lagging = limits.speed_m_s * trace.scenario.control.period_s**2 / (4.0 * limits.lag_s) if limits.lag_s else 0.0
+    return Fraction(limits.dip_m) + Fraction(lagging)
+
+
+def off_steered_m(trace: Trace, robot: str) -> Fraction:
+    """How far a robot's body may be off the straight lines of the point that the law steers, m."""
+    limits = _bounds(trace, robot)
+    room = Fraction(limits.cover_m) + Fraction(limits.dip_m)
+    return max(room - ROUNDED_M, Fraction(0))
+
+
+def law_m(trace: Trace, distance_m: Fraction, first: str, second: str) -> Fraction:
+    """The distance that the law keeps between two steered points, or one and a set at rest, m."""
+    robots, control = trace.scenario.robots, trace.scenario.control
+    about = control.period_s, trace.scenario.position_error_m
+    both = [bounds_of(robots[name], *about) for name in (first, second) if name in robots]
+    if all(plant.exact for plant in both):
+        return distance_m
+    return Fraction(float(law_distance(float(distance_m), *both, gain=control.avoidance_gain_1_s)))

@@ -22,8 +22,7 @@ from airground_drake.verify.proofs.export import (
     refuse_unknown,
 )
 from airground_drake.verify.proofs.record import FOLDER, digest
-from airground_drake.verify.proofs.table import Entry, Missed, entries, law_file, lawful, missed
-from airground_drake.verify.proofs.too_near import TooNear, too_near
+from airground_drake.verify.proofs.table import Entry, Missed, TooNear, entries, law_file, lawful, missed, too_near
 
 SCHEMA = "airground_drake.proofs/1"
 PLACE = "proofs"  # folder of a report for what is proved about it

@@ -18,7 +18,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.instants import GATED_METHODS, silent, talk_is_due, without_proposals
+from airground_drake.verify.runs.proposals import GATED_METHODS, silent, talk_is_due, without_proposals
 
 # Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m.
 POSITION_TOLERANCE_M = 1e-9

@@ -1,15 +1,18 @@
-"""Proposals of a run, as recorded."""
+"""Proposals of a run, as recorded; what was accepted of them, and for how long; when UGVs were intervened on."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from itertools import groupby, zip_longest
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.sim.trace import Trace, per_trace
+from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import unpacked
+from airground_drake.verify.finding import Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,3 +86,103 @@ def proposal_of(trace: Trace, number: int) -> ProposalRecord:
     if proposal is None:
         raise TraceError(f"no proposal has the number {number}")
     return proposal
+
+
+METHOD = "d"  # only this method has tries and rests, and predicts where an accepted intervention leads
+
+
+class Acceptance(NamedTuple):
+    """An accepted proposal, from its acceptance until the UGV gives it back, it is withdrawn, or the run ends."""
+
+    on: ProposalRecord  # the proposal
+    t_s: float  # when it was accepted
+    end_s: float  # when the UGV gave it back, or the gatekeeper's first sample at which it was withdrawn
+    until_s: float  # when it must be over: its motion has ended, or it has lasted as long as it may
+    given_back: bool  # whether the UGV ended it
+    # When the UGV sensed an obstacle for the first time that was not on the proposal's map, s.
+    news_s: tuple[float, ...]
+
+
+def acceptances(trace: Trace) -> dict[str, list[Acceptance]]:
+    """All acceptances of a run by UGV and time; {} for another method."""
+    return {ugv: _of_ugv(trace, ugv) for ugv in trace.ugvs} if trace.meta["method"] == METHOD else {}
+
+
+def below_avoidance(trace: Trace) -> tuple[int, int]:
+    """How many executed interventions were below avoidance, as method (d) has them, and how many there were."""
+    count = sum(len({*trace.sampled(f"{ugv}.executing").tolist()} - {-1.0}) for ugv in trace.ugvs)
+    return (count if trace.meta["method"] == METHOD else 0), count
+
+
+def _of_ugv(trace: Trace, ugv: str) -> list[Acceptance]:
+    gate = trace.scenario.gatekeeper
+    accepted = list[Acceptance]()
+    table = trace.decisions
+    mine = table[table["robot"] == ugv].sort_values("t_s", kind="stable")
+    given = zip(*(mine[name].tolist() for name in ("number", "decision", "t_s", "new")), strict=True)
+    answers = [(*key, [(t, len(new)) for *_, t, new in rows]) for key, rows in groupby(given, lambda row: row[:2])]
+    for (number, said, rows), following in zip_longest(answers, answers[1:]):
+        if said == "accept":
+            on = proposal_of(trace, number)
+            back = following is not None and following[0] == number
+            last = following[2][:1] if back else []
+            end_s = last[0][0] if back else min(rows[-1][0] + gate.period_s, float(trace.t[-1]))
+            until_s = min(float(on.times_s[-1]), rows[0][0] + gate.longest_s)
+            news_s = tuple(t for t, new in [*rows[1:], *last] if new)
+            accepted.append(Acceptance(on, rows[0][0], end_s, until_s, back, news_s))
+    return accepted
+
+
+GATED_METHODS = ("c", "d")  # methods with an optimising gatekeeper
+
+
+def row_at(trace: Trace, t_s: float) -> int:
+    """The row at a time, s, or the next one; for times after the run the last one."""
+    return min(int(np.searchsorted(trace.t, t_s - TIME_TOLERANCE_S)), len(trace.t) - 1)
+
+
+def intervening(trace: Trace, ugv: str) -> Array:
+    """Intervals of mode 1, (K, 2), s; the mode of a row is in force since the row before."""
+    inside = np.concatenate([[False], trace.column(f"{ugv}.mode")[1:] == 1.0, [False]])
+    edges = np.flatnonzero(np.diff(inside.astype(np.int8)))
+    return trace.t[edges].reshape(-1, 2)
+
+
+def talk_is_due(trace: Trace, ugv: str) -> bool:
+    """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
+    periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
+    return bool((np.diff(intervening(trace, ugv)) > periods).any())
+
+
+def without_proposals(trace: Trace) -> list[str]:
+    """UGVs for which policies were asked, but that got no proposal: the UAV found no way, or its policies failed."""
+    asked, got = {*trace.plans["ugv"]}, {*trace.proposals["robot"]}
+    return [ugv for ugv in trace.ugvs if ugv in asked - got]
+
+
+def lost_at_the_end(trace: Trace) -> list[str]:
+    """UGVs that are still intervened on at the end, and for which the UAV found no way when it last looked for one."""
+    return [ugv for ugv in trace.ugvs if _is_lost(trace, ugv)]
+
+
+def _is_lost(trace: Trace, ugv: str) -> bool:
+    switched = [
+        event["kind"] for event in trace.events if event["robot"] == ugv and event["kind"] in ("trigger", "release")
+    ]
+    asked = trace.plans[trace.plans["ugv"] == ugv]
+    last = asked[asked["t_s"] == asked["t_s"].max()]
+    proposed = bool(last["outcome"].isin(["proposed", "passed over"]).any())
+    return switched[-1:] == ["trigger"] and bool((last["reason"] != "").any()) and not proposed
+
+
+def reasons(trace: Trace) -> dict[str, str]:
+    """Why UGVs got no proposal, as the last policy that was asked said; UGVs without a reason are left out."""
+    said = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
+    lost = [*without_proposals(trace), *lost_at_the_end(trace)]
+    return {ugv: str(said[ugv]) for ugv in dict.fromkeys(lost) if ugv in said.index}
+
+
+def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
+    """Not run: UGVs were intervened on, but no message of a kind was recorded."""
+    reason = f"{', '.join(ugvs)}: in mode 'intervening', but the trace has no {kind}"
+    return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})

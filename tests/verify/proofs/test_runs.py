@@ -33,7 +33,7 @@ from airground_drake.verify.proofs.export import demands, distances_file, record
 from airground_drake.verify.proofs.readback import ReadbackError, compare
 from airground_drake.verify.proofs.record import closure
 from airground_drake.verify.proofs.runs import Workshop, expects_kept, prove
-from airground_drake.verify.proofs.too_near import too_near
+from airground_drake.verify.proofs.table import too_near
 
 UGV, ROCK = "ugv1", "obstacle_1"
 REFUSED = f"Coq refuses {UGV} and {ROCK}, 2 m"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from airground_drake.verify.proofs import coq
+from airground_drake.verify.proofs.coq import Checked, differences, write_record
 from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER
 from airground_drake.verify.proofs.theorems import THEOREMS
-from airground_drake.verify.proofs.theories import Checked, differences, write_record
 
 ASSUMED = "Variable it_is_so : forall n : nat, n = 0.\nTheorem so : 1 = 0.\nProof. apply it_is_so. Qed.\n"
 

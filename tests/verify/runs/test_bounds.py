@@ -14,8 +14,7 @@ from verify.runs.cases import B_D, BINARY, LOCAL, RELAXED, SIXTH, Edit, decision
 
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims import gate_plan
-from airground_drake.verify.runs import convex_bounds
-from airground_drake.verify.runs.convex_bounds import enclose
+from airground_drake.verify.claims.gate_plan import enclose
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 
 
@@ -55,7 +54,7 @@ def test_the_bound_holds_whatever_the_solver_returns(data: GateData, seed: int) 
     rng, row = np.random.default_rng(seed), data.row(np.zeros(STAGES))
     rubbish = [rng.uniform(0.0, 1.0, STAGES)], [rng.exponential(1.0, (STAGES, len(data.distances_m)))]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(convex_bounds, "_solve", lambda rows: rubbish)
+        patch.setattr(gate_plan, "_solve", lambda rows: rubbish)
         (found,) = enclose([row])
     costs = row.cost(row.positions(ALL_PLANS), data.normals)
     assert found.lower <= costs.min() + 1e-12
@@ -74,10 +73,10 @@ def test_it_is_narrow_where_the_solver_stops_early_because_costs_are_tiny(
     row = data.row(np.ones(STAGES))
     with pytest.MonkeyPatch.context() as patch:
         solved = [rng.uniform(0.9, 1.0, STAGES)], [np.zeros((STAGES, m))]
-        patch.setattr(convex_bounds, "_solve", lambda rows: solved)
+        patch.setattr(gate_plan, "_solve", lambda rows: solved)
         (found,) = enclose([row])
     assert found.lower <= data.relaxed_optimum() + 1e-12
-    assert found.upper - found.lower <= convex_bounds.WIDE * row.scale
+    assert found.upper - found.lower <= gate_plan.WIDE * row.scale
 
 
 def test_plans_of_blocks_are_enumerated(base: Callable[[str], Trace]) -> None:
@@ -90,8 +89,8 @@ def test_a_bad_solution_gives_no_margin(base: Callable[[str], Trace], monkeypatc
     def nothing(rows: list[DecisionRecord]) -> Any:
         return [np.full(STAGES, 0.5) for _ in rows], [np.zeros((STAGES, len(row["distances_m"]))) for row in rows]
 
-    monkeypatch.setattr(convex_bounds, "_solve", nothing)
-    monkeypatch.setattr(convex_bounds, "_minimiser", lambda row, _: np.full(STAGES, 0.5))
+    monkeypatch.setattr(gate_plan, "_solve", nothing)
+    monkeypatch.setattr(gate_plan, "_minimiser", lambda row, _: np.full(STAGES, 0.5))
     found = decided("GATE-PLAN", base(RELAXED))
     assert (found.status, found.margin) == ("holds", None)
     assert found.evidence["optimum"].startswith("unknown: the bounds of an optimum are")

@@ -18,12 +18,11 @@ from verify.runs.cases import A_D, B_C, B_D, at, first, problem
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import MOTION_TOLERANCE_M, TIME_TOLERANCE_S
 from airground_drake.verify.claims import safe_hyp
-from airground_drake.verify.claims.gate_plan import LONGER, SPEED_TOLERANCE
+from airground_drake.verify.claims.gate_plan import LONGER, SPEED_TOLERANCE, TIE
 from airground_drake.verify.claims.live_goal import AT_REST_M
 from airground_drake.verify.claims.thr_trig import EVENT_TOLERANCE_S, VARIABLE_TOLERANCE_M
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, cost_tolerance, rows_of
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M
-from airground_drake.verify.runs.sum_up_rounding import TIE
 from airground_drake.verify.runs.triggers import NOISE_TOLERANCE_M
 
 Edit = Callable[[Trace, float], Trace]

@@ -10,8 +10,7 @@ from scipy.special import ndtr
 from verify.model.threshold.cases import INPUTS
 
 from airground_drake.verify.claims import thr_ddm
-from airground_drake.verify.model import first_passages
-from airground_drake.verify.model.first_passages import PassageExperiment
+from airground_drake.verify.claims.thr_ddm import PassageExperiment
 
 
 def sampled(each: PassageExperiment, nodes: int = 160) -> tuple[float, float]:
@@ -35,18 +34,18 @@ def sampled(each: PassageExperiment, nodes: int = 160) -> tuple[float, float]:
 def test_what_the_barrier_correction_leaves_is_within_the_allowances(drift: float, deviation: float) -> None:
     each = PassageExperiment("", drift, 1.0, 1.0, deviation, 1, 0)
     periods, wrong = sampled(each)
-    time, rate = first_passages.running(each)
+    time, rate = thr_ddm.running(each)
     assert abs(periods - 0.25 - time / each.period) < thr_ddm.TIME_ALLOWANCE
     assert abs(wrong - rate) < thr_ddm.ERROR_ALLOWANCE
     for inputs in INPUTS.values():  # whose experiments are in the range of this test
-        for one in first_passages.experiments(inputs):
+        for one in thr_ddm.experiments(inputs):
             assert 0.0 < one.zeta * one.drift / one.noise**2 <= 10.0
             assert abs(one.deviation) <= 0.4 * one.zeta * (1.0 + 1e-12)
 
 
 def test_paths_are_followed_to_their_ends() -> None:
     each = PassageExperiment("", 1.0, 1.0, 1.0, 0.0, 500, 3)
-    found, again = first_passages.simulate(each), first_passages.simulate(replace(each, seed=4))
-    assert found == first_passages.simulate.__wrapped__(each)
+    found, again = thr_ddm.simulate(each), thr_ddm.simulate(replace(each, seed=4))
+    assert found == thr_ddm.simulate.__wrapped__(each)
     assert (found.wrong, found.periods) != (again.wrong, again.periods)
-    assert first_passages.simulate(replace(each, drift=1e-3, noise=1e-6)).wrong == 0  # the drift alone decides
+    assert thr_ddm.simulate(replace(each, drift=1e-3, noise=1e-6)).wrong == 0  # the drift alone decides

@@ -10,7 +10,6 @@ from verify.model.threshold.cases import TABLE_1
 
 from airground_drake.verify.claims import thr_ddm
 from airground_drake.verify.claims.thr_ddm import ThrDdm
-from airground_drake.verify.model import first_passages
 
 
 def test_formulas_are_supported_and_intervals_can_be_redone_by_hand(judged: Judged) -> None:
@@ -44,8 +43,8 @@ def test_formulas_are_supported_and_intervals_can_be_redone_by_hand(judged: Judg
 
 def test_wrong_formulas_are_refuted() -> None:
     """Without the initial deviation."""
-    chosen = first_passages.experiments(TABLE_1)
-    finding = thr_ddm.compare(chosen, lambda each: first_passages.running(replace(each, deviation=0.0)))
+    chosen = thr_ddm.experiments(TABLE_1)
+    finding = thr_ddm.compare(chosen, lambda each: thr_ddm.running(replace(each, deviation=0.0)))
     assert finding.status == "refuted"
     assert finding.counterexample is not None
     assert finding.counterexample["constants"]["deviation"] != 0.0
@@ -54,7 +53,7 @@ def test_wrong_formulas_are_refuted() -> None:
 def test_pyddm_agrees_with_the_formulas() -> None:
     """An independent package, in units of zeta and zeta^2/noise^2."""
     pyddm = pytest.importorskip("pyddm")
-    for each in first_passages.experiments(TABLE_1):
+    for each in thr_ddm.experiments(TABLE_1):
         unit = (each.zeta / each.noise) ** 2
         model = pyddm.gddm(
             drift=each.drift * unit / each.zeta,
@@ -67,4 +66,4 @@ def test_pyddm_agrees_with_the_formulas() -> None:
         solution = model.solve()
         density = solution.pdf("correct") + solution.pdf("error")
         found = float(density @ solution.t_domain) * float(model.dt) * unit, float(solution.prob("error"))
-        assert found == pytest.approx(first_passages.running(each), rel=1e-4)
+        assert found == pytest.approx(thr_ddm.running(each), rel=1e-4)

@@ -10,9 +10,9 @@ from verify.model.trigger.cases import REFINE
 
 from airground_drake.model.trigger.automaton import Trigger
 from airground_drake.sim.components import integrated_noise
+from airground_drake.verify.claims import zeno_refine
+from airground_drake.verify.claims.zeno_refine import experiment
 from airground_drake.verify.engines.geometry import NormSignal
-from airground_drake.verify.model import refined_paths
-from airground_drake.verify.model.refined_paths import experiment
 from airground_drake.verify.runs.triggers import transitions
 
 
@@ -28,7 +28,7 @@ def test_expected_bare_count_against_random_walks(leak: float) -> None:
         count += (x < 0.0) & (after >= 0.0)
         x = after
     error = count.std() / math.sqrt(walks)
-    assert abs(count.mean() - refined_paths.expected_bare(setting, dt)) < 4.0 * error
+    assert abs(count.mean() - zeno_refine.expected_bare(setting, dt)) < 4.0 * error
 
 
 @given(
@@ -44,7 +44,7 @@ def test_fast_triggers_are_those_of_the_independent_checker(values: list[float],
     expected = [
         time for time, kind in transitions(signal, trigger.zeta, trigger.release, trigger.dwell) if kind == "trigger"
     ]
-    assert refined_paths.triggers(trigger, x, dt) == pytest.approx(expected, abs=1e-9)
+    assert zeno_refine.triggers(trigger, x, dt) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -59,14 +59,14 @@ def test_fast_triggers_are_those_of_the_independent_checker(values: list[float],
     ],
 )
 def test_triggers_by_hand(trigger: Trigger, x: list[float], times: list[float]) -> None:
-    assert refined_paths.triggers(trigger, np.array(x), 1.0) == times
+    assert zeno_refine.triggers(trigger, np.array(x), 1.0) == times
 
 
 def test_paths_are_those_of_the_diagrams_noise() -> None:
     """Euler steps of the diagram's AffineSystem with the same normal samples."""
     setting = experiment(REFINE | {"leak_1_s": 0.7})
-    dt, n = setting.dt_s[2], refined_paths.path(setting, 0)[2]
-    unit = refined_paths.path(experiment(REFINE), 0)[2]
+    dt, n = setting.dt_s[2], zeno_refine.path(setting, 0)[2]
+    unit = zeno_refine.path(experiment(REFINE), 0)[2]
     samples = np.diff(unit) / math.sqrt(dt)  # without leak a path is the sum of its samples
     noise = integrated_noise(1, 1.0, setting.leak_1_s, dt)
     assert n[0] == unit[0]
