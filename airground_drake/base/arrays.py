@@ -4,6 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]  # numbers in binary64; docstrings and comments give shapes and units
+Flags = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.intp]
 
 # Largest size of a scenario's numbers and of a proposal's times and coordinates: their products stay finite.
 LARGEST = 1e9

@@ -6,9 +6,8 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.model.bodies.kinds import KINDS, ROBOTS, Kind
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.geometry import outline
@@ -83,9 +82,9 @@ class Neighbours(NamedTuple):
         max_speed: of the robots, (k,), m/s.
     """
 
-    members: npt.NDArray[np.intp]
-    carrier: npt.NDArray[np.intp]
-    others: npt.NDArray[np.intp]
+    members: Indices
+    carrier: Indices
+    others: Indices
     still: Array
     parts: Array
     distance: Array
@@ -170,7 +169,7 @@ class World:
         still, moving = self.there(t, self.resting)[self.owner], self.there(t, self.moving)[near.carrier]
         return near._replace(still=outline.where(still, near.still), parts=outline.where(moving, near.parts))
 
-    def there(self, t: float, bodies: Sequence[Body]) -> npt.NDArray[np.bool_]:
+    def there(self, t: float, bodies: Sequence[Body]) -> Flags:
         """Which bodies are there at time t, s."""
         return np.array([body.appears_s <= t + SAME_S < body.disappears_s for body in bodies], dtype=np.bool_)
 
@@ -181,7 +180,7 @@ class World:
         return outline.joined(*resting) if resting else outline.stacked([])
 
     @cached_property
-    def owner(self) -> npt.NDArray[np.intp]:
+    def owner(self) -> Indices:
         """The body of each row of `still`, (m,), as an index in `resting`."""
         return np.repeat(np.arange(len(self.resting)), [len(body.shape) for body in self.resting])
 

@@ -23,10 +23,9 @@ theorem of set-based avoidance needs nothing else.
 from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 from numpy.typing import ArrayLike
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 
 GAP, RADIUS, SPEED, BASE, TOP, COUNT, MIDDLE, EXTENT, CORNERS = 0, 1, 2, 3, 4, 5, 6, 8, 9
 SAME_M = 1e-9  # outlines whose numbers differ by no more than this are one, m
@@ -87,7 +86,7 @@ def as_tuple(row: Array) -> tuple[float, ...]:
     return tuple(row[: CORNERS + 2 * int(row[COUNT])].tolist())
 
 
-def is_among(one: Array, other: Array) -> npt.NDArray[np.bool_]:
+def is_among(one: Array, other: Array) -> Flags:
     """Whether each outline of one array, (m, W), has the same core as one of another, (k, V): (m,)."""
     among = np.zeros(len(one), dtype=bool)
     if not (len(one) and len(other)):
@@ -102,12 +101,12 @@ def is_among(one: Array, other: Array) -> npt.NDArray[np.bool_]:
     return among
 
 
-def are_outlines(rows: Array) -> npt.NDArray[np.bool_]:
+def are_outlines(rows: Array) -> Flags:
     """Which rows (m, W) are outlines of convex cores, (m,); others may come from a stranger."""
     if rows.ndim != 2 or rows.shape[1] < CORNERS + 2:
         return np.zeros(len(rows), dtype=bool)
     count = rows[:, COUNT]
-    sound: npt.NDArray[np.bool_] = np.logical_and.reduce([
+    sound: Flags = np.logical_and.reduce([
         np.isfinite(rows).all(axis=1), (rows[:, [GAP, RADIUS, SPEED, EXTENT]] >= 0.0).all(axis=1),
         rows[:, BASE] <= rows[:, TOP], count >= 1.0, count == np.floor(count), CORNERS + 2.0 * count <= rows.shape[1],
     ])  # fmt: skip
@@ -155,7 +154,7 @@ def moved(rows: Array, by: Array) -> Array:
     return shifted
 
 
-def where(there: npt.NDArray[np.bool_], rows: Array) -> Array:
+def where(there: Flags, rows: Array) -> Array:
     """Outlines (m, W), with a point at NOWHERE_M in place of each that is not there; `there` is (m,)."""
     nowhere = np.zeros(rows.shape[1])
     nowhere[: CORNERS + 2] = balls(np.full(3, NOWHERE_M))[0]

@@ -24,7 +24,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.arrays import Array, Flags, Indices, read_only
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.outline import BASE, CORNERS, COUNT, MIDDLE, TOP
 from airground_drake.model.geometry.separation import are_separated
@@ -182,7 +182,7 @@ class _Obstacles:
         return np.concatenate((_places(self.c), self.rows[:, MIDDLE : MIDDLE + 2]))
 
     @cached_property
-    def cells(self) -> NDArray[np.intp]:
+    def cells(self) -> Indices:
         """The square cell that has the middle of each disc and polygon, as wide as the longest distance to keep."""
         size = max(self.r.max(initial=0.0), self.keep.max(initial=0.0))
         return np.unique(np.floor(self.middles / size), axis=0, return_inverse=True)[1].ravel()
@@ -227,7 +227,7 @@ class _Obstacles:
         )
 
     @cached_property
-    def touchable(self) -> NDArray[np.bool_]:
+    def touchable(self) -> Flags:
         """Which circles have a point that no obstacle covers, (n,); no free path touches another one."""
         # On a map that is one in eight: obstacles overlap. Of a corner's circle, only the arc between its two edges is
         # on the boundary of its own polygon. Of that arc a little more is looked at, for rounding.
@@ -262,19 +262,19 @@ class _Obstacles:
             return self  # with what is known of its circles
         return replace(self, r=np.minimum(self.r, far), keep=np.minimum(self.keep, farther))
 
-    def some(self, which: NDArray[np.bool_]) -> Self:
+    def some(self, which: Flags) -> Self:
         """Some of discs and polygons, (m + k,)."""
         discs, others = np.split(which, [len(self.r)])
         return replace(self, c=self.c[discs], r=self.r[discs], rows=self.rows[others], keep=self.keep[others])
 
-    def clear(self, points: Points) -> NDArray[np.bool_]:
+    def clear(self, points: Points) -> Flags:
         """Which points, (n,), are outside everything; (n,)."""
         free = _clear(points[:, None], self.c, self.r)
         if len(self.rows):
             free &= convex.points_are_free(_places(points), self.rows, self.keep - _EPS)
         return free
 
-    def passable(self, a: Points, b: Points) -> NDArray[np.bool_]:
+    def passable(self, a: Points, b: Points) -> Flags:
         """Which segments, from (n,) to (n,), nothing blocks; (n,)."""
         free = _passable(a, b, self.c, self.r)
         if len(self.rows):
@@ -282,7 +282,7 @@ class _Obstacles:
             free[left] = convex.ways_are_clear(_places(a[left]), _places(b[left]), self.rows, self.keep - _EPS)
         return free
 
-    def entered(self, pieces: Array) -> NDArray[np.bool_]:
+    def entered(self, pieces: Array) -> Flags:
         """Which discs and polygons pieces of a path (see ``Path``) run into, or nearly; (m + k,)."""
         discs = _entered(pieces, self.c, self.r)
         if not len(self.rows):
@@ -328,7 +328,7 @@ def _outermost(c: Points, r: Array) -> tuple[Points, Array]:
     return c[keep], r[keep]
 
 
-def _are_outermost(c: Points, r: Array) -> NDArray[np.bool_]:
+def _are_outermost(c: Points, r: Array) -> Flags:
     """Which discs are not inside another one, of equal discs the first; (m,)."""
     if not len(r):
         return np.ones(0, dtype=bool)
@@ -341,12 +341,12 @@ def _are_outermost(c: Points, r: Array) -> NDArray[np.bool_]:
     return keep
 
 
-def _clear(points: Points, c: Points, r: Array) -> NDArray[np.bool_]:
+def _clear(points: Points, c: Points, r: Array) -> Flags:
     """Which points, shape (n, 1) or one per disc (n, m), are outside all discs; shape (n,)."""
     return np.asarray((abs(points - c) >= r - _EPS).all(axis=1))
 
 
-def _passable(a: Points, b: Points, c: Points, r: Array) -> NDArray[np.bool_]:
+def _passable(a: Points, b: Points, c: Points, r: Array) -> Flags:
     """Which segments, from (n,) to (n,), no disc blocks; shape (n,)."""
     u = (b - a) / np.maximum(abs(b - a), 1e-300)
     free = np.ones(len(a), dtype=bool)
@@ -356,7 +356,7 @@ def _passable(a: Points, b: Points, c: Points, r: Array) -> NDArray[np.bool_]:
     return free
 
 
-def _crossings(c: Points, r: Array) -> tuple[Points, NDArray[np.intp]]:
+def _crossings(c: Points, r: Array) -> tuple[Points, Indices]:
     """The points where two circles cross, (n,), and the indices of the two circles, (2, n)."""
     i, j = np.triu_indices(len(r), 1)
     d = abs(c[j] - c[i])
@@ -368,7 +368,7 @@ def _crossings(c: Points, r: Array) -> tuple[Points, NDArray[np.intp]]:
     return np.concatenate((c[i] + (a + 1j * h) * u, c[i] + (a - 1j * h) * u)), np.tile((i, j), 2)
 
 
-def _on_edges(c: Points, r: Array, begin: Points, end: Points) -> tuple[Points, NDArray[np.intp]]:
+def _on_edges(c: Points, r: Array, begin: Points, end: Points) -> tuple[Points, Indices]:
     """Where circles meet or touch segments from (k,) to (k,): the points and the indices of the circles, (n,)."""
     points, circles = [np.empty(0, dtype=complex)], [np.empty(0, dtype=np.intp)]
     if not len(begin):
@@ -416,7 +416,7 @@ def _exit(p: complex, around: _Obstacles) -> complex:
     return complex(min(candidates[around.clear(candidates)], key=lambda z: float(abs(z - p))))
 
 
-def _tangents(c: Points, r: Array, ways: Points) -> tuple[Points, Points, NDArray[np.intp]]:
+def _tangents(c: Points, r: Array, ways: Points) -> tuple[Points, Points, Indices]:
     """Both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points."""
     # A tangent that cuts the polygon about whose corner the circle is, is left out: the ways to the next corners,
     # (2, m), lead to its other side.
@@ -466,7 +466,7 @@ def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
             some[nearest[np.isfinite(apart[nearest])][: int(some.sum()) // 4]] = True
 
 
-def _entered(pieces: Array, c: Points, r: Array) -> NDArray[np.bool_]:
+def _entered(pieces: Array, c: Points, r: Array) -> Flags:
     """Which discs pieces of a path (see ``Path``) run into; shape (m,)."""
     x, y, tx, ty, curvature, length = pieces.T[:, :, None]
     begin, heading, bent = x + 1j * y, tx + 1j * ty, curvature != 0.0

@@ -18,9 +18,8 @@ from fractions import Fraction
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.model.plants.budget import Bounds
 
 # Signals of a body that is not where the law steers it: its position, world frame.
@@ -64,8 +63,8 @@ class Recorded(NamedTuple):
 
     t_s: Array  # (T,)
     signals: Array  # those of its plant, (T, k)
-    first: npt.NDArray[np.intp]  # the row at which each period begins, (K,)
-    last: npt.NDArray[np.intp]  # the row at which it ends, (K,)
+    first: Indices  # the row at which each period begins, (K,)
+    last: Indices  # the row at which it ends, (K,)
     sampled_s: Array  # times of the control samples, (S,)
     measured: Array  # what is measured of its plant, (S, m)
     max_speed_m_s: float  # of its commands

@@ -3,9 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from airground_drake.base.arrays import Flags
+
 MOST_CELLS = 16_000_000  # most cells of a map
 
-Cells = NDArray[np.bool_]  # a value for each cell, (rows, columns)
+Cells = Flags  # a value for each cell, (rows, columns)
 # First row, last row + 1, first column, last column + 1 of each rectangle of cells, (n, 4).
 Rectangles = NDArray[np.int64]
 

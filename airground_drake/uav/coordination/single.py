@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.uav.coordination import intervals
 from airground_drake.uav.coordination.intervals import Indices
 from airground_drake.uav.coordination.roadmap import Roadmap, RobotNodes, RobotTask, Space
@@ -52,7 +51,7 @@ class Mover:
     roadmap: Roadmap  # the part that it can use
     space: Space  # discs and distances that it has to keep
     to_go: Array  # lower bound of the time from every node to its preset, (N,), s
-    clear: npt.NDArray[np.bool_]  # which pieces of its preset between neighbouring nodes are free of discs, (K - 1,)
+    clear: Flags  # which pieces of its preset between neighbouring nodes are free of discs, (K - 1,)
     edges: intervals.Edges
     # What other robots block, by the identity of a motion and a radius, and the motion, which keeps it alive.
     blocked: dict[tuple[int, float], tuple[Indices, Array, Array]] = field(default_factory=dict)

@@ -12,11 +12,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy import sparse
 from scipy.optimize import lsq_linear
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.errors import TraceError
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
@@ -375,7 +374,7 @@ def _seen_at(trace: Trace, row: DecisionRecord) -> Array:
     return seen
 
 
-def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -> npt.NDArray[np.bool_]:
+def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -> Flags:
     """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding."""
     # Neither the points of the problem nor the barriers themselves may be so near: of a wall the problem has but
     # points.

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.model.bodies.motion import PeriodMotion
 
 # Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of 1e-17 s, and
@@ -137,8 +136,6 @@ def _minima(t: Array, parts: Array) -> Array:
 ROWS = 32  # Of a block. Between rows a robot moves straight, so on a block it stays in the box around its rows.
 AT_ONCE = 300_000  # pairs of boxes that are compared together, so that they fit into the memory
 ROUNDING_M = 1e-9  # what a bound allows for rounding, m: distances up to 1e4 m err by 1e-12 m
-
-Indices = npt.NDArray[np.intp]
 
 
 class Boxes(NamedTuple):

@@ -16,14 +16,10 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.model.bodies.motion import PeriodMotion
 from airground_drake.verify.engines.geometry import ROUNDING_M, ROWS, boxes_of
-
-Indices = npt.NDArray[np.intp]
-Flags = npt.NDArray[np.bool_]
 
 # What the numbers of an *outline* in a trace mean: distance to keep, radius of the rounding, speed, heights of the
 # core, number of corners, a circle round them, and the corners; `model.geometry.outline` describes it.

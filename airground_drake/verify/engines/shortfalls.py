@@ -25,9 +25,8 @@ from math import inf, isqrt, nextafter
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.verify.engines.outlines import Cores, away_from
 
 SCREEN_M = 1e-9  # floats decide pairs by more than this, m: for bodies within 1e5 m they err by less than 1e-10 m
@@ -84,7 +83,7 @@ class _Pair(NamedTuple):
     held: bool
 
 
-def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArray[np.intp]:
+def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> Indices:
     """Samples that floats find neither far nor met by more than `SCREEN_M`: their numbers."""
     distance, normal = away_from(pair.core, (first - other)[:-1], planar=pair.planar)
     normal[~normal.any(axis=1)] = np.nan
@@ -101,7 +100,7 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArr
     return np.flatnonzero((distance - d - reach <= SCREEN_M) & ~met)
 
 
-def _near(first: Array, other: Array, pair: _Pair, last: float) -> npt.NDArray[np.intp]:
+def _near(first: Array, other: Array, pair: _Pair, last: float) -> Indices:
     """Samples at which a pair is not far: their numbers."""
     distance, _ = away_from(pair.core, (first - other)[:-1], planar=pair.planar)
     reach = np.zeros(len(distance))

@@ -15,9 +15,8 @@ from math import ceil, inf
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance, part_of_gain
 from airground_drake.scenario.schema import MAP, Obstacle, Scenario
 from airground_drake.scenario.shapes import convex_parts
@@ -380,7 +379,7 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
     return dict(zip(parts.names, np.minimum.reduceat(apart, parts.first).tolist(), strict=True))
 
 
-def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> npt.NDArray[np.bool_]:
+def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> Flags:
     """At which places (K, 3), m, of its steered point a robot is by more than `by_m` too near to a barrier, (K,)."""
     too_near = np.zeros(len(places), dtype=np.bool_)
     pairs = pairs_beside(trace, robot)

@@ -10,9 +10,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import Indices, away_from
@@ -21,8 +20,6 @@ from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, Pair, cores_
 
 STANDING_M_S = 1e-9  # a robot that is commanded no more than this stands, m/s
 AT_LIMIT_M_S = 1e-6  # a speed this near to the limit is at the limit, m/s
-
-Flags = npt.NDArray[np.bool_]
 
 
 def passive_pairs(trace: Trace) -> list[Pair]:
