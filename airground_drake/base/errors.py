@@ -5,12 +5,8 @@ from contextlib import contextmanager
 from pathlib import PurePath
 from traceback import extract_tb, format_list, walk_tb
 
-VALUE_WIDTH = 120
-"""Longer values are cut in messages, characters."""
-FAULT_WIDTH = 300
-"""Longer messages of third-party code are cut, characters."""
-TRACEBACK_CHARS = 4000
-"""Of longer tracebacks of third-party code only the end is kept, characters."""
+# Longest values and messages, and tracebacks of third-party code, of which only the end is kept, characters.
+VALUE_WIDTH, FAULT_WIDTH, TRACEBACK_CHARS = 120, 300, 4000
 
 
 class AirgroundError(Exception):
@@ -73,15 +69,11 @@ class PluginError(AirgroundError):
 
 
 class PolicyError(AirgroundError):
-    """A policy's process failed: the policy's own exception, or how the process ended, in words.
-
-    Attributes:
-        traceback: of the policy's own exception, see `traceback_of`; '' without one.
-    """
+    """A policy's process failed: the policy's own exception, or how the process ended, in words."""
 
     def __init__(self, what: str, traceback: str = "") -> None:
         super().__init__(what)
-        self.traceback = traceback
+        self.traceback = traceback  # of the policy's own exception, see `traceback_of`; '' without one
 
 
 class ReportError(AirgroundError):
@@ -127,13 +119,8 @@ def short(text: str) -> str:
 
 
 def described(error: BaseException, function: object = None) -> str:
-    """An exception of third-party code as one printable line of bounded length. Its `__str__` may raise, too.
-
-    Args:
-        error: the exception.
-        function: a function of that code. If the exception passed its file, the line begins with the place, such as
-            `boom.py:5`.
-    """
+    """An exception of third-party code as one printable line of bounded length. Its `__str__` may raise, too."""
+    # function: of that code. If the exception passed its file, the line begins with the place, such as `boom.py:5`.
     try:
         text = f"{_place(error, function)}{type(error).__name__}: {error}"[:FAULT_WIDTH]
     except BaseException:  # its text is third-party code, too
@@ -151,10 +138,7 @@ def raised_as(made: Callable[[BaseException], Exception]) -> Iterator[None]:
 
 
 def traceback_of(error: BaseException) -> str:
-    """The traceback of an exception of third-party code, from the function that this package called.
-
-    Its lines are printable, its length is bounded, and files are named without their folders.
-    """
+    """The traceback of an exception of third-party code, from the function that this package called: printable."""
     frames = extract_tb(error.__traceback__)[1:]
     for frame in frames:
         frame.filename = PurePath(frame.filename).name

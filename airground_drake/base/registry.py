@@ -235,21 +235,13 @@ def _entry_points(group: str) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to couple UAV and UGVs.
+    """A way to couple UAV and UGVs."""
 
-    Attributes:
-        id: as in scenario files.
-        says: in words.
-        intervenes: whether the UAV makes proposals.
-        gated: whether the UGVs decide about proposals, by (21)-(29) or by outcomes.
-        intervention_on_top: priorities of (20); False: avoidance above the intervention.
-    """
-
-    id: str
-    says: str
-    intervenes: bool
-    gated: bool
-    intervention_on_top: bool
+    id: str  # as in scenario files
+    says: str  # in words
+    intervenes: bool  # whether the UAV makes proposals
+    gated: bool  # whether the UGVs decide about proposals, by (21)-(29) or by outcomes
+    intervention_on_top: bool  # priorities of (20); False: avoidance above the intervention
 
 
 # The methods that are compared, by identifier: (a) to (c) are the paper's.

@@ -123,21 +123,19 @@ def judge_all(
         for trace in traces
     ]  # as in `judge`
     pieces: list[Callable[[], Any]] = [partial(cached_finding, case.claim, case.inputs, kept) for case in cases]
-    pieces += [partial(_Judged.of, trace, about_run, about_model) for trace, about_run in of_runs]
+    pieces += [partial(_judged, trace, about_run, about_model) for trace, about_run in of_runs]
     names = [*(case.name for case in cases), *(f"claims about run {trace.run}" for trace, _ in of_runs)]
     progress.stage("judging", len(pieces), "claims about the model or a run")
     done = run_parallel(pieces, names=names, progress=progress)
-    judged: list[_Judged] = done[len(cases) :]
-    verdicts = [
-        verdict
-        for (trace, about_run), of_run in zip(of_runs, judged, strict=True)
-        for verdict in _verdicts(trace, about_run, of_run.findings)
-    ]
+    judged = done[len(cases) :]
+    verdicts = list[Verdict]()
+    for (trace, about_run), (findings, _) in zip(of_runs, judged, strict=True):
+        verdicts += _verdicts(trace, about_run, findings)
     apart = {(case.claim.id, case.run) for case in cases if case.run}
     for case, finding in zip(cases, done, strict=False):
         seen = [
-            of_run.seen[case.claim.id]
-            for (trace, _), of_run in zip(of_runs, judged, strict=True)
+            shown[case.claim.id]
+            for (trace, _), (_, shown) in zip(of_runs, judged, strict=True)
             if case.run == (trace.run if (case.claim.id, trace.run) in apart else "")
         ]
         verdicts.append(case.verdict(scenario, case.claim.judge_runs(finding, seen)))
@@ -176,13 +174,9 @@ def _cases(scenario: Scenario, claims: Collection[str] | None = None) -> list[_C
     ]
 
 
-class _Judged(NamedTuple):
-    """What the claims found about a run, and what it shows of claims about the model, by their identifiers."""
-
-    findings: list[Finding]
-    seen: dict[str, Any]
-
-    @classmethod
-    def of(cls, trace: Trace, claims: Sequence[TraceClaim], about_model: Collection[ModelClaim]) -> _Judged:
-        seen = {claim.id: claim.judge_run(trace) for claim in about_model}
-        return cls([claim.judge(trace) for claim in claims], seen)
+def _judged(
+    trace: Trace, claims: Sequence[TraceClaim], about_model: Collection[ModelClaim]
+) -> tuple[list[Finding], dict[str, Any]]:
+    """What claims found about a run, and what it shows of claims about the model, by their identifiers."""
+    seen = {claim.id: claim.judge_run(trace) for claim in about_model}
+    return [claim.judge(trace) for claim in claims], seen

@@ -57,16 +57,12 @@ class NoPath(ValueError):  # noqa: N818
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A planar curve of joined straight segments and circular arcs, parameterised by arc length; immutable.
+    """A planar curve of joined straight segments and circular arcs, parameterised by arc length; immutable."""
 
-    Attributes:
-        pieces: (n, 6), n >= 1, a row per piece in order of travel: x, y of its first point, m, its unit tangent there,
-            signed curvature, 1/m (0 straight, > 0 turning left), length, m. A path of zero length has tangent 0.
-        length_m: total length, m.
-    """
-
+    # A row per piece in order of travel, (n, 6), n >= 1: x, y of its first point, m, its unit tangent there, signed
+    # curvature, 1/m (0 straight, > 0 turning left), length, m. A path of zero length has tangent 0.
     pieces: Array
-    length_m: float = field(init=False)
+    length_m: float = field(init=False)  # in all, m
     _rows: tuple[tuple[float, ...], ...] = field(init=False, repr=False)
     _begins: tuple[float, ...] = field(init=False, repr=False)
 
@@ -79,10 +75,7 @@ class Path:
         object.__setattr__(self, "_begins", ends[:-1])
 
     def at(self, s: float) -> tuple[Array, Array]:
-        """Point, (2,), m, and unit tangent in the direction of travel, (2,), at an arc length, m.
-
-        The arc length is clipped to the path; the tangent of a path of zero length is 0.
-        """
+        """Point, (2,), m, and unit tangent in the direction of travel, (2,), at an arc length, m, which is clipped."""
         s = min(max(s, 0.0), self.length_m)
         k = bisect_right(self._begins, s) - 1
         x, y, tx, ty, curvature, _ = self._rows[k]

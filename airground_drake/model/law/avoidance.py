@@ -38,16 +38,12 @@ _CODES = {"augmented": kernels.AUGMENTED, "recursion_nearest": kernels.RECURSION
 
 @dataclass(frozen=True)
 class HalfSpaces:
-    """K velocity constraints for each of n robots: normal . v >= bound.
+    """K velocity constraints for each of n robots: normal . v >= bound."""
 
-    Attributes:
-        normal: (n, K, 3); unit vectors away from what is avoided, with 0 in directions in which the robot cannot move;
-            0 where out of sensing range.
-        bound: (n, K), m/s; -inf where out of sensing range.
-    """
-
+    # Unit vectors away from what is avoided, (n, K, 3), with 0 in directions in which the robot cannot move; 0 where
+    # out of sensing range.
     normal: Array
-    bound: Array
+    bound: Array  # (n, K), m/s; -inf where out of sensing range
 
     def slack(self, velocity: Array) -> Array:
         """normal . v - bound for velocities (n, 3) m/s: (n, K) m/s, negative where violated."""
@@ -80,7 +76,6 @@ class Avoidance:
     stands: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse numbers that mean nothing."""
         if not (0.0 <= self.gain < np.inf and 0.0 < self.period < np.inf and self.sensing_range >= 0.0):
             raise ValueError(f"{self}; wanted: finite gain >= 0 and period > 0, sensing_range >= 0")
 

@@ -25,17 +25,11 @@ from airground_drake.model.plants.steering import EDGES, NUMBERS, keep_ahead
 
 
 class AcceptedMotion(NamedTuple):
-    """The demand of an accepted intervention on one UGV now, (12)-(13).
+    """The demand of an accepted intervention on one UGV now, (12)-(13)."""
 
-    Attributes:
-        wanted: where it is to be, (3,), m, world frame.
-        rate: velocity of that place, (3,), m/s.
-        chosen: J_int^+ J_int, projector onto the directions in which the UAV intervenes, (3, 3).
-    """
-
-    wanted: Array
-    rate: Array
-    chosen: Array
+    wanted: Array  # where it is to be, (3,), m, world frame
+    rate: Array  # velocity of that place, (3,), m/s
+    chosen: Array  # J_int^+ J_int, projector onto the directions in which the UAV intervenes, (3, 3)
 
 
 class Numbers(NamedTuple):

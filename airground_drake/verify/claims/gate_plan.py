@@ -7,7 +7,7 @@ and convexity gives bounds that need no trust in any solver: see `enclose`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -189,34 +189,6 @@ MOST_BLOCKS = 12
 NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (26)"
 
 
-@dataclass(frozen=True)
-class Choices:
-    """The evidence about decisions."""
-
-    decisions: int  # their number
-    reasons: dict[str, int]  # how many were made for each reason
-    comparisons: int  # numbers compared
-    wrong: int  # of these
-    optimum: str  # whether the optimum of every problem is known, and if not, why
-    enumerated: int  # decisions for which all plans were evaluated: at most `BLOCKS` choices, under (d) both outcomes
-    largest_gap_to_enumeration: float | None  # of such a plan to the best of all, relative to the best
-
-
-@dataclass(frozen=True)
-class Plans(Choices):
-    """The evidence where problems (26) were solved; gaps and enclosures are relative to the cheaper constant plan."""
-
-    without_a_plan: list[str]  # refusals because there was no plan
-    largest_slack_m: float  # how far a plan leads inside a safe distance at most
-    plans_with_slack: int  # how many do
-    rounded_plans: int  # decisions with a relaxed plan
-    largest_rounding_error_s: float  # of sum-up rounding
-    largest_gaps: list[dict[str, Any]]  # the five largest, with robot and time; below 0: cheaper by exact distances
-    median_gap: float | None  # see above
-    widest_enclosure: float  # width of the bounds of an optimum
-    first_stage_certified: int  # plans whose first stage every plan with the other one costs more than
-
-
 class GatePlan(GateClaim):
     id = "GATE-PLAN"
     subject = "plans of the gatekeeper"
@@ -290,33 +262,30 @@ class GatePlan(GateClaim):
             optimum = f"unknown: {len(planned) - len(bounded)} of {len(planned)} plans have no half-planes"
         elif widest > WIDEST:
             optimum = f"unknown: the bounds of an optimum are {widest:.2g} apart"
-        evidence = Plans(
-            decisions=len(rows),
-            reasons=reasons_of(trace),
-            comparisons=len(compared),
-            wrong=sum(deviation.wrong for deviation in compared),
-            optimum=optimum,
-            enumerated=len(beside_all),
-            largest_gap_to_enumeration=max(beside_all, default=None),
-            without_a_plan=[row.label for row in rows if not row.planned],
-            largest_slack_m=max(slack, default=0.0),
-            plans_with_slack=sum(value > 0.0 for value in slack),
-            rounded_plans=len(rounded),
-            largest_rounding_error_s=max(map(integrated_error_s, rounded), default=0.0),
-            largest_gaps=[{"t_s": row.row.t_s, "robot": row.row.robot, "gap": row.gap} for row in bounded[:5]],
-            median_gap=float(np.median([decision.gap for decision in bounded])) if bounded else None,
-            widest_enclosure=widest,
-            first_stage_certified=sum(decision.first_stage_certified for decision in bounded),
+        # gaps and enclosures are relative to the cheaper constant plan
+        evidence = (
+            _of_decisions(trace, rows, compared, beside_all, optimum)
+            | {
+                "without_a_plan": [row.label for row in rows if not row.planned],
+                "largest_slack_m": max(slack, default=0.0),  # how far a plan leads inside a safe distance at most
+                "plans_with_slack": sum(value > 0.0 for value in slack),
+                "rounded_plans": len(rounded),
+                "largest_rounding_error_s": max(map(integrated_error_s, rounded), default=0.0),
+                "largest_gaps": [{"t_s": row.row.t_s, "robot": row.row.robot, "gap": row.gap} for row in bounded[:5]],
+                "median_gap": float(np.median([decision.gap for decision in bounded])) if bounded else None,
+                "widest_enclosure": widest,
+                "first_stage_certified": sum(decision.first_stage_certified for decision in bounded),
+            }
         )
         known = optimum == "known"
-        worst = evidence.largest_gaps[0] if known else {}
+        worst = evidence["largest_gaps"][0] if known else {}
         finding = Finding(
             "holds",
             margin=max(0.0, worst["gap"]) if known else None,
             unit="of the cheaper constant plan's cost",
             quantity="largest gap of a plan to the half-plane optimum",
             where={name: worst[name] for name in ("robot", "t_s") if known},
-            evidence=asdict(evidence),
+            evidence=evidence,
             exercised=len(planned),
         )
         return conclude(finding, compared)
@@ -392,16 +361,23 @@ def _judge_outcomes(trace: Trace, rows: Sequence[DecisionRecord]) -> Finding:
     looked = [row for row in rows if row.given["accept_stalls"] >= 0.0]
     compared = [deviation for row in looked for deviation in _compare_choice(trace, row)]
     gaps = [_above_the_other(row) for row in looked]
-    evidence = Choices(
-        decisions=len(rows),
-        reasons=reasons_of(trace),
-        comparisons=len(compared),
-        wrong=sum(deviation.wrong for deviation in compared),
-        optimum=f"unknown: {NO_PROBLEM}",
-        enumerated=len(looked),
-        largest_gap_to_enumeration=max(gaps, default=None),
-    )
-    return conclude(Finding("holds", evidence=asdict(evidence), exercised=len(looked)), compared)
+    evidence = _of_decisions(trace, rows, compared, gaps, f"unknown: {NO_PROBLEM}")
+    return conclude(Finding("holds", evidence=evidence, exercised=len(looked)), compared)
+
+
+def _of_decisions(
+    trace: Trace, rows: Sequence[DecisionRecord], compared: Sequence[Deviation], gaps: Sequence[float], optimum: str
+) -> dict[str, Any]:
+    """The evidence about decisions under both methods; `gaps` of those for which all choices were evaluated."""
+    return {
+        "decisions": len(rows),
+        "reasons": reasons_of(trace),
+        "comparisons": len(compared),
+        "wrong": sum(deviation.wrong for deviation in compared),
+        "optimum": optimum,
+        "enumerated": len(gaps),
+        "largest_gap_to_enumeration": max(gaps, default=None),  # relative to the best
+    }
 
 
 def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:

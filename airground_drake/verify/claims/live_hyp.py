@@ -1,7 +1,6 @@
 """LIVE-HYP: a run meets the hypotheses of LIVE-WAIT and LIVE-GATE (coq/Patience.v)."""
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -11,16 +10,6 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.gate_record import DecisionRecord, GateClaim
 from airground_drake.verify.runs.proposals import METHOD, Acceptance, acceptances
-
-
-@dataclass(frozen=True)
-class Followed:
-    """The evidence: acceptances, and the most of them and the longest time executed between two rests of a UGV."""
-
-    acceptances: int
-    given_back: int
-    most_tries: int
-    longest_between_rests_s: float
 
 
 class LiveHyp(GateClaim):
@@ -88,7 +77,12 @@ class LiveHyp(GateClaim):
             quantity="time that LIVE-WAIT allows between two rests, less the longest that was executed",
             where=where,
             counterexample=min(wrong, key=lambda fault: float(fault["t_s"]), default=None),
-            evidence=asdict(Followed(len(total), sum(acceptance.given_back for acceptance in total), most, longest_s)),
+            evidence={
+                "acceptances": len(total),
+                "given_back": sum(acceptance.given_back for acceptance in total),
+                "most_tries": most,
+                "longest_between_rests_s": longest_s,
+            },
             exercised=len(total),
         )
 

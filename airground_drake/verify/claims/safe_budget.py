@@ -22,8 +22,6 @@ BESIDE_MOVING = ("Passive.own_doing", "Passive.kept")
 
 
 class SafeBudget(TheoremClaim):
-    """SAFE-BUDGET."""
-
     id = "SAFE-BUDGET"
     subject = "distance budget"
     summary = "The law adds what turning, lags, delays and errors of positions cost, so bodies keep the safe distance."
@@ -115,7 +113,8 @@ class SafeBudget(TheoremClaim):
         return [*stable(gain, h), *needs, *self._pairs(inputs)]
 
     def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
-        error_m, share = inputs.get("position_error_m", 0.0), _share(inputs)
+        error_m = inputs.get("position_error_m", 0.0)
+        share = float(decimal(inputs["avoidance_gain_1_s"]) * decimal(inputs["period_s"]))
         bounds = {
             name: plant.bounds(speed)._replace(error_m=error_m) for name, (plant, speed) in _plants(inputs).items()
         }
@@ -134,11 +133,6 @@ class SafeBudget(TheoremClaim):
                 least = least_gain(pair["safe_m"], *both)
                 says = f"{pair['first']}, {pair['second']}: A h = {share:.6g} bears the errors, at least {least:.6g}"
                 yield Hypothesis("A h less what errors ask for", says, share - least, "1", share >= least)
-
-
-def _share(inputs: dict[str, Any]) -> float:
-    """A h."""
-    return float(decimal(inputs["avoidance_gain_1_s"]) * decimal(inputs["period_s"]))
 
 
 def _plants(inputs: dict[str, Any]) -> dict[str, tuple[Plant, float]]:

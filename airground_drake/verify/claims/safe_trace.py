@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -78,15 +79,17 @@ class SafeTrace(TraceClaim):
         worst = min(listed, key=lambda distance: distance.margin_m)
         safe = worst.margin_m >= -DISTANCE_TOLERANCE_M
         both = (worst.first, worst.second)
+        against: dict[str, Any] | None = None
+        if not safe:
+            why = next(encounter.told(trace) for encounter in encounters(trace) if encounter[:2] == both)
+            against = asdict(worst) | _place(trace, worst) | {"why": why} | snapshot(trace, both, worst.t_s)
         return Finding(
             "holds" if safe else "refuted",
             margin=worst.margin_m,
             unit="m",
             quantity="least distance of a pair less its safe distance",
             where={"first": worst.first, "second": worst.second, "t_s": worst.t_s, **_place(trace, worst)},
-            counterexample=None
-            if safe
-            else asdict(worst) | _place(trace, worst) | _why(trace, worst) | snapshot(trace, both, worst.t_s),
+            counterexample=against,
             evidence={
                 "pairs": [asdict(distance) for distance in listed],
                 "pairs_in_all": len(pairs),
@@ -124,9 +127,3 @@ def _entry(trace: Trace, k: int) -> Distance:
 def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:
     """Where on the map, if it is about the map."""
     return place_on_map(trace, worst.first, worst.t_s) if worst.second == MAP else {}
-
-
-def _why(trace: Trace, worst: Distance) -> dict[str, str]:
-    """Whose doing it was."""
-    both = worst.first, worst.second
-    return {"why": next(encounter.told(trace) for encounter in encounters(trace) if encounter[:2] == both)}

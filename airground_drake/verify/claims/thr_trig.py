@@ -120,7 +120,10 @@ class ThrTrig(TraceClaim):
             where={"robot": worst[1]} if worst else {},
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
             evidence={
-                **asdict(Replay(replayed, _block(trace) or "that of (15)", *levels, dict(due))),
+                "ugvs": [asdict(ugv) for ugv in replayed],
+                "decision_block": _block(trace) or "that of (15)",
+                **levels._asdict(),
+                "transitions_due": dict(due),
                 **isolation(trace.scenario.decision.noise_period_s, trace.scenario.control.period_s, levels),
             },
             exercised=due.total(),
@@ -187,18 +190,6 @@ class Replayed:
     worst_time_difference_s: float
     largest_decision_variable_m: float
     port_against_15: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Replay:
-    """The evidence: the trigger of each UGV, the block of x, the levels in force, transitions that were due by kind."""
-
-    ugvs: list[Replayed]
-    decision_block: str
-    zeta_m: float
-    release_m: float
-    dwell_s: float
-    transitions_due: dict[str, int]
 
 
 class Reconstruction(NamedTuple):

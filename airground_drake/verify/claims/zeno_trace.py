@@ -1,6 +1,5 @@
 """ZENO-TRACE: the times between the triggers of a run."""
 
-from dataclasses import asdict, dataclass
 from itertools import pairwise
 
 from airground_drake.base.errors import TraceError
@@ -8,33 +7,6 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.triggers import column_conflict, recorded_events
-
-
-@dataclass(frozen=True)
-class Triggers:
-    """Triggers of a UGV: how many, and when, s."""
-
-    count: int
-    t_s: list[float]
-
-
-@dataclass(frozen=True, order=True)
-class TriggerGap:
-    """Two consecutive triggers of a UGV, s."""
-
-    gap_s: float
-    robot: str
-    previous_t_s: float
-    t_s: float
-
-
-@dataclass(frozen=True)
-class Gaps:
-    """The evidence: triggers by UGV, the bound on gaps, s, and the number of triggers that it admits."""
-
-    triggers: dict[str, Triggers]
-    bound_s: float
-    most_triggers_possible: int
 
 
 class ZenoTrace(TraceClaim):
@@ -61,30 +33,30 @@ class ZenoTrace(TraceClaim):
         bound = float(trace.scenario.decision.min_inter_event_s)
         if bound <= 0.0:
             return Finding("not_run", evidence={"reason": "min_inter_event_s is 0: no bound to compare with"})
-        triggers: dict[str, Triggers] = {}
+        triggers: dict[str, list[float]] = {}
         for ugv in trace.ugvs:
             events = recorded_events(trace, ugv)
             if conflict := column_conflict(trace, ugv, events):
                 raise TraceError(f"events and columns disagree: {conflict}")
-            times = [time for time, kind in events if kind == "trigger"]
-            triggers[ugv] = Triggers(len(times), times)
-        evidence = asdict(Gaps(triggers, bound, int(trace.scenario.duration_s / bound) + 1))
-        gaps = [
-            TriggerGap(after - before, ugv, before, after)
-            for ugv, of_ugv in triggers.items()
-            for before, after in pairwise(of_ugv.t_s)
-        ]
+            triggers[ugv] = [time for time, kind in events if kind == "trigger"]
+        evidence = {
+            "triggers": {ugv: {"count": len(times), "t_s": times} for ugv, times in triggers.items()},
+            "bound_s": bound,
+            "most_triggers_possible": int(trace.scenario.duration_s / bound) + 1,
+        }
+        gaps = [(t_s - before, ugv, before, t_s) for ugv, times in triggers.items() for before, t_s in pairwise(times)]
         if not gaps:
             return Finding("holds", evidence=evidence | {"reason": "no UGV was triggered twice"}, exercised=0)
-        smallest = min(gaps)
-        held = smallest.gap_s >= bound - TIME_TOLERANCE_S
+        smallest = dict(zip(("gap_s", "robot", "previous_t_s", "t_s"), min(gaps), strict=True))
+        margin = min(gaps)[0] - bound
+        held = margin >= -TIME_TOLERANCE_S
         return Finding(
             "holds" if held else "refuted",
-            margin=smallest.gap_s - bound,
+            margin=margin,
             unit="s",
             quantity="smallest gap between two triggers less the bound",
-            where={"robot": smallest.robot, "t_s": smallest.t_s},
-            counterexample=None if held else asdict(smallest),
-            evidence=evidence | {"smallest_gap": asdict(smallest)},
+            where={key: smallest[key] for key in ("robot", "t_s")},
+            counterexample=None if held else smallest,
+            evidence=evidence | {"smallest_gap": smallest},
             exercised=len(gaps),
         )

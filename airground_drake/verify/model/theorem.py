@@ -15,19 +15,11 @@ from airground_drake.verify.proofs import THEOREMS, standing
 
 @dataclass(frozen=True)
 class Hypothesis(Evidence):
-    """A hypothesis of a theorem with the numbers of a scenario.
+    """A hypothesis of a theorem with the numbers of a scenario."""
 
-    Attributes:
-        hypothesis: what the margin is of, in a few words.
-        says: the hypothesis in words.
-        margin: how far it is from failing, in `unit`.
-        unit: of the margin.
-        holds: whether the scenario meets it.
-    """
-
-    hypothesis: str
-    says: str
-    margin: float
+    hypothesis: str  # what the margin is of, in a few words
+    says: str  # the hypothesis in words
+    margin: float  # how far it is from failing, in `unit`
     unit: str
     holds: bool
 
@@ -39,22 +31,13 @@ class Hypothesis(Evidence):
 
 @dataclass(frozen=True, kw_only=True)
 class Proof(Evidence):
-    """The evidence of a theorem.
+    """The evidence of a theorem."""
 
-    Attributes:
-        proof: whether Coq has checked the theorems, in words.
-        theorems: what they say, by name.
-        hypotheses: those that were checked.
-        reason: why the claim is left open.
-        applies_to: how often the runs of a report met the premise, `of` how many times.
-        of: see `applies_to`.
-    """
-
-    proof: str
-    theorems: dict[str, str]
-    hypotheses: Sequence[Hypothesis]
-    reason: str | None = None
-    applies_to: int | None = None
+    proof: str  # whether Coq has checked the theorems, in words
+    theorems: dict[str, str]  # what they say, by name
+    hypotheses: Sequence[Hypothesis]  # those that were checked
+    reason: str | None = None  # why the claim is left open
+    applies_to: int | None = None  # how often the runs of a report met the premise, `of` how many times
     of: int | None = None
 
 
@@ -76,14 +59,10 @@ class TheoremClaim(ModelClaim):
 
     It is proved if Coq has checked the installed theories and every hypothesis holds. A hypothesis that fails leaves
     the claim open, unless `counterexample` shows that the claim is false.
-
-    Attributes (all of the class):
-        theorems: names in `airground_drake.verify.proofs.THEOREMS`.
-        margin_of: name of the hypothesis whose margin is the claim's.
     """
 
-    theorems: tuple[str, ...]
-    margin_of: str
+    theorems: tuple[str, ...]  # names in `airground_drake.verify.proofs.THEOREMS`
+    margin_of: str  # name of the hypothesis whose margin is the claim's
     exercised_by = "hypotheses that were checked"
 
     @abc.abstractmethod

@@ -282,11 +282,14 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
     """The run, and the theorem that every pair keeps its distance at all times; Coq needs the `vectors`."""
     interval = f"{real(run.times[0])} <= t <= {real(run.times[-1])}"
     claims = [_claim(run, demand) for demand in run.demands]
-    lemmas = [
-        f"{_vectors(run, demand) if vectors and demand.core else ''}"
-        f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\nProof. {_tactic(demand)}. Qed.\n\n"
-        for demand, claim in zip(run.demands, claims, strict=True)
-    ]
+    lemmas = ""
+    for demand, claim in zip(run.demands, claims, strict=True):
+        decided = f"decide_clear {ratio(demand.safe_m)} {demand.lemma}_vectors"
+        if not demand.core:
+            decided = f"decide_distance {ratio(demand.safe_m)}"
+        elif vectors:
+            lemmas += _vectors(run, demand)
+        lemmas += f"Lemma {demand.lemma} : forall t, {interval} ->\n  {claim}.\nProof. {decided}. Qed.\n\n"
     checks = _DISTANCES.format(
         run=run.name, interval=interval, start=ratio(run.times[0]), end=ratio(run.times[-1])
     )  # fmt: skip
@@ -299,7 +302,7 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
     return (
         f"(** That {run.name} keeps its distances. Written by `airground prove`, from the positions in trace/. *)\n"
         "Require Import Reals Lra ZArith List.\nRequire Import Safety Convex Run DistanceChecker.\n"
-        f"Import ListNotations.\nLocal Open Scope Z_scope.\n\n{data(run)}{checks}{''.join(lemmas)}"
+        f"Import ListNotations.\nLocal Open Scope Z_scope.\n\n{data(run)}{checks}{lemmas}"
         "(** All pairs: distances of centres, which are the safe distance and both radii, in m; times in s. *)\n"
         f"{together}Proof. intros t T; exact {proof}. Qed.\n\n{bodies}"
         f"Print Assumptions {theorem}.\n"
@@ -369,13 +372,6 @@ def _claim(run: Recorded, demand: Demand) -> str:
         return f"clear {run.name} {demand.first} {demand.second} {demand.sets} {real(demand.safe_m)} t"
     positions = (f"(position {run.name} {name} t)" for name in (demand.first, demand.second))
     return f"{real(demand.safe_m)} <= norm (sub {' '.join(positions)})"
-
-
-def _tactic(demand: Demand) -> str:
-    """Has Coq decide a claim."""
-    if not demand.core:
-        return f"decide_distance {ratio(demand.safe_m)}"
-    return f"decide_clear {ratio(demand.safe_m)} {demand.lemma}_vectors"
 
 
 def _vectors(run: Recorded, demand: Demand) -> str:

@@ -30,7 +30,7 @@ class RereadError(NamedTuple):
 
 def compare(text: str, trace: Trace) -> RereadError:
     """Compare the file about distances with the run that it should be about."""
-    spelled, error = _compare_positions(text, trace)
+    spelled, error = compare_positions(text, trace)
     named = [pair._replace(first=spelled[pair.first], second=spelled[pair.second]) for pair in demands_of(trace)]
     wanted = [(pair.first, pair.second, pair.sets if pair.core else "", pair.safe_m) for pair in named]
     _compare_statement(f"run_{trace.run}", text, trace, wanted)
@@ -39,12 +39,7 @@ def compare(text: str, trace: Trace) -> RereadError:
     return error
 
 
-def compare_positions(text: str, trace: Trace, *, steered: bool = False) -> RereadError:
-    """Compare the positions in an exported file with those of the run that it should be about."""
-    return _compare_positions(text, trace, steered=steered)[1]
-
-
-def _compare_positions(text: str, trace: Trace, *, steered: bool = False) -> tuple[dict[str, str], RereadError]:
+def compare_positions(text: str, trace: Trace, *, steered: bool = False) -> tuple[dict[str, str], RereadError]:
     """The names of bodies in the file, by their names in the trace, and by how much coordinates differ."""
     run = f"run_{trace.run}{'_steered' if steered else ''}"
     unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)

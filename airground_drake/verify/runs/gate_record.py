@@ -30,37 +30,26 @@ MAY_BE_EMPTY = ("plan", "positions_m", "relaxed", "rounded", "normals")
 
 @dataclass(frozen=True, eq=False)
 class DecisionRecord:
-    """One decision, and its problem if it has one: a row of `Trace.decisions` and of `Trace.problems`.
+    """One decision, and its problem if it has one: a row of `Trace.decisions` and of `Trace.problems`."""
 
-    Attributes:
-        given: the columns of `Trace.decisions`.
-        dt: length of a stage, s.
-        error_weight: a of (25), 1/(m^2 s).
-        slack_weight: b of (25), 1/(m^2 s).
-        terminal_weight: w of the terminal cost w a ||rho_rd - rho_N||^2 that is added to (25), s.
-        data: arrays of `Trace.problems` by name, in the shapes that are stated there; None where empty.
-    """
-
-    given: dict[str, Any]
-    dt: float = -1.0
-    error_weight: float = -1.0
-    slack_weight: float = -1.0
-    terminal_weight: float = -1.0
+    given: dict[str, Any]  # the columns of `Trace.decisions`
+    dt: float = -1.0  # length of a stage, s
+    error_weight: float = -1.0  # a of (25), 1/(m^2 s)
+    slack_weight: float = -1.0  # b of (25), 1/(m^2 s)
+    terminal_weight: float = -1.0  # w of the terminal cost w a ||rho_rd - rho_N||^2 that is added to (25), s
+    # Arrays of `Trace.problems` by name, in the shapes that are stated there; None where empty.
     data: dict[str, Array | None] = field(default_factory=dict)
 
     @property
     def t_s(self) -> float:
-        """Time of the decision, s."""
         return float(self.given["t_s"])
 
     @property
     def robot(self) -> str:
-        """The UGV that decides."""
         return str(self.given["robot"])
 
     @property
     def number(self) -> int:
-        """Number of the proposal that it is about."""
         return int(self.given["number"])
 
     def __getitem__(self, name: str) -> Array:
@@ -72,7 +61,6 @@ class DecisionRecord:
 
     @property
     def label(self) -> str:
-        """Which decision."""
         return f"decision of {self.robot} at t = {self.given['t_s']} s"
 
     @property
@@ -82,7 +70,6 @@ class DecisionRecord:
 
     @property
     def stages(self) -> int:
-        """N."""
         return len(self["reference_m"])
 
     def positions(self, omega: Array) -> Array:
@@ -91,10 +78,8 @@ class DecisionRecord:
         return self["initial_m"] + self.dt * np.cumsum(velocity, axis=-2)
 
     def gaps(self, positions: Array, normals: Array | None = None) -> Array:
-        """Distances minus d at the end of each stage, (..., N, m), m; along normals (N, m, 3) if given.
-
-        Normals are unit vectors, or 0 where nothing is asked: the gap there is 0.
-        """
+        """Distances minus d at the end of each stage, (..., N, m), m; along normals (N, m, 3) if given."""
+        # Normals are unit vectors, or 0 where nothing is asked: the gap there is 0.
         away = positions[..., None, :] - self["centres_m"]
         if normals is None:
             return np.linalg.norm(away, axis=-1) - self["distances_m"]
@@ -110,10 +95,8 @@ class DecisionRecord:
 
     @cached_property
     def half_planes(self) -> Array:
-        """Normals of the half-planes in place of (26d), (N, m, 3): 0 where no plan can come nearer than d.
-
-        At the end of a stage plans are between the sums of the smaller and of the larger velocities so far.
-        """
+        """Normals of the half-planes in place of (26d), (N, m, 3): 0 where no plan can come nearer than d."""
+        # At the end of a stage plans are between the sums of the smaller and of the larger velocities so far.
         low, high = (
             self["initial_m"] + self.dt * np.cumsum(bound(self["accept_m_s"], self["refuse_m_s"]), axis=0)[:, None]
             for bound in (np.minimum, np.maximum)
@@ -213,7 +196,6 @@ class Deviation:
     """A comparison: how far a recorded value is from what it should be, and how far it may be."""
 
     def __init__(self, row: DecisionRecord, what: str, by: Any, allowed: float, **more: Any) -> None:
-        """Compare."""
         # by: differences, of any shape; the largest absolute one counts.
         self.row = row
         self.what = what
@@ -227,7 +209,6 @@ class Deviation:
         return not self.off <= self.allowed
 
     def to_json(self) -> dict[str, Any]:
-        """For a counterexample."""
         at = {name: self.row.given[name] for name in ("t_s", "robot", "policy", "decision", "reason", "status")}
         return {**at, "what": self.what, "off": self.off, "allowed": self.allowed, **self.more}
 

@@ -429,14 +429,10 @@ def apart_of(trace: Trace) -> Array:
 
 def off_m_of(trace: Trace, name: str) -> float:
     """How far a body may be from the straight line between its positions at two rows, m."""
-    return trace.derived(("off", name), lambda: float(bends_of(trace, name).max(initial=0.0)))
-
-
-def bends_of(trace: Trace, name: str) -> Array:
-    """How far a body may be from the straight line between its positions at two rows, in each segment, (T - 1,), m."""
     if name not in trace.robots:
-        return np.zeros(len(trace.t) - 1)
-    return trace.plant(name).bends_m(trace.t, trace.signals(name))
+        return 0.0
+    bend = trace.plant(name).bends_m
+    return trace.derived(("off", name), lambda: float(bend(trace.t, trace.signals(name)).max(initial=0.0)))
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:

@@ -112,14 +112,9 @@ def noise_off(t: Array, noise: Array, given: Decision) -> Array:
     dt, h = np.diff(t), given.noise_period_s
     lasting = dt[:, None]
     moved = np.diff(noise, axis=0) + given.leak_1_s * noise[:-1] * lasting
-    due = lasting * _rates(moved, dt, np.floor(0.5 * (t[1:] + t[:-1]) / h))
+    _, period = np.unique(np.floor(0.5 * (t[1:] + t[:-1]) / h), return_inverse=True)
+    order = np.lexsort((dt, period))
+    longest = order[np.append(np.diff(period[order]) > 0, True)]  # the longest step in each period
+    due = lasting * (moved[longest] / dt[longest, None])[period]
     most = LARGEST_SAMPLE * given.noise_m_sqrt_s / np.sqrt(h) * lasting
     return np.asarray(np.maximum(np.abs(moved - due), np.abs(moved) - most))
-
-
-def _rates(moved: Array, dt: Array, period: Array) -> Array:
-    """moved / dt of the longest step in the same period, for each step, (S, n)."""
-    _, of = np.unique(period, return_inverse=True)
-    order = np.lexsort((dt, of))
-    longest = order[np.append(np.diff(of[order]) > 0, True)]
-    return np.asarray((moved[longest] / dt[longest, None])[of])
