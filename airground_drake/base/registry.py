@@ -325,21 +325,21 @@ SAMPLERS = Registry(
     },
 )
 
+
+def _claims(identifiers: str) -> dict[str, str]:
+    """The class of each claim, in the file of its name: SAFE-TRACE is `SafeTrace` in safe_trace.py."""
+    place = "airground_drake.verify.claims.{}:{}"
+    return {
+        claim: place.format(claim.lower().replace("-", "_"), claim.title().replace("-", ""))
+        for claim in identifiers.split()
+    }
+
+
 # Claims about one run, in the order of the report: subclasses of `verify.claim.TraceClaim`.
 RUN_CLAIMS = Registry(
     "claim",
     "run_claims",
-    {
-        "SAFE-TRACE": "airground_drake.verify.claims.safe_trace:SafeTrace",
-        "SAFE-OWN": "airground_drake.verify.claims.safe_own:SafeOwn",
-        "SAFE-HYP": "airground_drake.verify.claims.safe_hyp:SafeHyp",
-        "ZENO-TRACE": "airground_drake.verify.claims.zeno_trace:ZenoTrace",
-        "THR-TRIG": "airground_drake.verify.claims.thr_trig:ThrTrig",
-        "THR-QUALITY": "airground_drake.verify.claims.thr_quality:ThrQuality",
-        "GATE-PLAN": "airground_drake.verify.claims.gate_plan:GatePlan",
-        "LIVE-HYP": "airground_drake.verify.claims.live_hyp:LiveHyp",
-        "LIVE-GOAL": "airground_drake.verify.claims.live_goal:LiveGoal",
-    },
+    _claims("SAFE-TRACE SAFE-OWN SAFE-HYP ZENO-TRACE THR-TRIG THR-QUALITY GATE-PLAN LIVE-HYP LIVE-GOAL"),
 )
 
 ARRIVAL = "LIVE-GOAL"  # the claim that every robot ends where it is to end; a preset must lead there, or it may fail
@@ -348,18 +348,8 @@ ARRIVAL = "LIVE-GOAL"  # the claim that every robot ends where it is to end; a p
 MODEL_CLAIMS = Registry(
     "claim",
     "model_claims",
-    {
-        "SAFE-INV": "airground_drake.verify.claims.safe_inv:SafeInv",
-        "SAFE-BUDGET": "airground_drake.verify.claims.safe_budget:SafeBudget",
-        "SAFE-GATE": "airground_drake.verify.claims.safe_gate:SafeGate",
-        "SAFE-DIST": "airground_drake.verify.claims.safe_dist:SafeDist",
-        "ZENO-PROOF": "airground_drake.verify.claims.zeno_proof:ZenoProof",
-        "ZENO-REFINE": "airground_drake.verify.claims.zeno_refine:ZenoRefine",
-        "LIVE-GATE": "airground_drake.verify.claims.live_gate:LiveGate",
-        "LIVE-WAIT": "airground_drake.verify.claims.live_wait:LiveWait",
-        "THR-ROOT": "airground_drake.verify.claims.thr_root:ThrRoot",
-        "THR-OPT": "airground_drake.verify.claims.thr_opt:ThrOpt",
-        "THR-CHOICE": "airground_drake.verify.claims.thr_choice:ThrChoice",
-        "THR-DDM": "airground_drake.verify.claims.thr_ddm:ThrDdm",
-    },
+    _claims(
+        "SAFE-INV SAFE-BUDGET SAFE-GATE SAFE-DIST ZENO-PROOF ZENO-REFINE LIVE-GATE LIVE-WAIT THR-ROOT THR-OPT "
+        "THR-CHOICE THR-DDM"
+    ),
 )

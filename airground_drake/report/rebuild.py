@@ -218,7 +218,7 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
     from airground_drake.report import junit, model, proved
     from airground_drake.report.figures.draw import draw
     from airground_drake.report.page import page
-    from airground_drake.verify.proofs.compare import broken_rules
+    from airground_drake.verify.proofs.runs import broken_rules
 
     made = model.of(report)
     proofs: Any = None

@@ -77,14 +77,9 @@ def _next_constraint(digits: Indices, choices: Indices) -> bool:
 
 
 @njit(cache=True)
-def _by_priority(priorities: Array, order: Indices) -> None:
-    """Write the robots into `order`, the largest priority first."""
-    for i in range(len(order)):
-        k = i
-        while k > 0 and priorities[order[k - 1]] < priorities[i]:
-            order[k] = order[k - 1]
-            k -= 1
-        order[k] = i
+def _by_priority(priorities: Array) -> Indices:
+    """The robots, the largest priority first."""
+    return np.argsort(-priorities, kind="mergesort")
 
 
 @njit(cache=True)
@@ -148,7 +143,7 @@ def _search(
         far = max(far, to_go[0, i, starts[i]])
     for i in range(count):
         priorities[0, i] = 0.9 * to_go[0, i, starts[i]] / far
-    _by_priority(priorities[0], orders[0])
+    orders[0] = _by_priority(priorities[0])
     table[_looked_up(table, nodes, layers, starts, 0)[1]] = 0
     goal, many, successors = -1, 1, 0
     stack = [0]
@@ -196,7 +191,7 @@ def _search(
         for i in range(count):
             old = priorities[here, i]
             priorities[many, i] = old - np.floor(old) if wanted[i] == targets[i] else old + 1.0
-        _by_priority(priorities[many], orders[many])
+        orders[many] = _by_priority(priorities[many])
         if _have_arrived(team, wanted, layer):
             goal = many
         stack.append(many)

@@ -293,27 +293,14 @@ def _fan(space: Space, start: Array, far: float) -> Array:
     return np.asarray(places[space.points_are_free(places, CHORDS * space.clearance)])
 
 
-@njit(cache=True)
 def _in_rows(points: Array, pairs: Indices) -> tuple[Indices, Indices, Array]:
     """Edges in both directions, sorted by tail and head: first edge of each node, heads, lengths."""
-    first = np.zeros(len(points) + 1, np.int64)
-    for k in range(len(pairs)):
-        first[pairs[k, 0] + 1] += 1
-        first[pairs[k, 1] + 1] += 1
-    first = np.cumsum(first)
-    end, unsorted, heads = first[:-1].copy(), np.empty(first[-1], np.int64), np.empty(first[-1], np.int64)
-    for k in range(len(pairs)):
-        for side in range(2):
-            tail = pairs[k, side]
-            unsorted[end[tail]] = pairs[k, 1 - side]
-            end[tail] += 1
-    end, lengths = first[:-1].copy(), np.empty(first[-1])
-    for tail in range(len(points)):  # tails in order make the other direction sorted by head
-        for head in unsorted[first[tail] : first[tail + 1]]:
-            dx, dy = points[head, 0] - points[tail, 0], points[head, 1] - points[tail, 1]
-            heads[end[head]], lengths[end[head]] = tail, max(np.sqrt(dx * dx + dy * dy), ROUNDING_M)
-            end[head] += 1
-    return first, heads, lengths
+    one, other = pairs.T
+    lengths = np.maximum(np.sqrt(np.square(points[other] - points[one]).sum(axis=1)), ROUNDING_M)
+    ends = np.append(one, other), np.append(other, one)
+    graph = csr_array((np.tile(lengths, 2), ends), shape=(len(points),) * 2)
+    graph.sort_indices()
+    return graph.indptr.astype(np.int64), graph.indices.astype(np.int64), graph.data
 
 
 def _grid(points: Array, low: Array, size: float) -> Grid:

@@ -14,7 +14,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from fractions import Fraction
 from functools import cache, cached_property
 from itertools import chain, groupby, pairwise
-from math import isqrt, lcm
+from math import lcm
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.pair_kinds import MOVING, apart
 from airground_drake.verify.proofs.coq import without_comments
 from airground_drake.verify.proofs.record import FOLDER
-from airground_drake.verify.proofs.separating import Prism, Vector, separating
+from airground_drake.verify.proofs.separating import Prism, Vector, root_up, separating
 
 # Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser.
 PARTS = 2**60
@@ -438,9 +438,7 @@ def _point(place: Vector) -> str:
 
 def stride(rows: Sequence[Vector]) -> int:
     """The longest step, parts, rounded up."""
-    square = max(sum((b - a) ** 2 for a, b in zip(p, q, strict=True)) for p, q in pairwise(rows))
-    root = isqrt(square)
-    return root + (root * root < square)
+    return root_up(max(sum((b - a) ** 2 for a, b in zip(p, q, strict=True)) for p, q in pairwise(rows)))
 
 
 def real(number: Fraction) -> str:

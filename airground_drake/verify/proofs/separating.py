@@ -131,13 +131,13 @@ class _Search:
         """The last row of the periods from a row on that a vector serves; the row itself if it serves none."""
         if not any(vector):
             return row
-        along = max(_dot(vector, corner) for corner in self._corners)
-        least = along + max(1, _root_up(self._safe**2 * _dot(vector, vector)))
+        along = max(dot(vector, corner) for corner in self._corners)
+        least = along + max(1, root_up(self._safe**2 * dot(vector, vector)))
         direction = np.array(vector, dtype=np.float64)
         beyond = self._rows[row:] @ direction - float(least)
         doubt = self._doubt * np.linalg.norm(direction)
         for k in np.flatnonzero(beyond <= doubt).tolist():
-            if beyond[k] < -doubt or _dot(vector, self._way[row + k]) < least:
+            if beyond[k] < -doubt or dot(vector, self._way[row + k]) < least:
                 return row + max(k - 1, 0)
         return len(self._way) - 1
 
@@ -154,9 +154,9 @@ def apart(prism: Prism, begin: Vector, end: Vector) -> tuple[Fraction, Vector]:
     best = (Fraction(0), (0, 0, 0))
     corners = prism.corners
     for vector in _directions(prism, begin, end):
-        reach = min(_dot(vector, begin), _dot(vector, end)) - max(_dot(vector, corner) for corner in corners)
+        reach = min(dot(vector, begin), dot(vector, end)) - max(dot(vector, corner) for corner in corners)
         if reach > 0:
-            best = max(best, (Fraction(reach * reach, _dot(vector, vector)), vector))
+            best = max(best, (Fraction(reach * reach, dot(vector, vector)), vector))
     return best
 
 
@@ -166,10 +166,10 @@ def _directions(prism: Prism, begin: Vector, end: Vector) -> Iterator[Vector]:
     for corner in prism.corners:
         to = _minus(begin, corner)
         yield from (to, _minus(end, corner))
-        yield _minus(_times(_dot(way, way), to), _times(_dot(to, way), way))
+        yield _minus(_times(dot(way, way), to), _times(dot(to, way), way))
     for (corner, edge), place in product(prism.edges, (begin, end)):
         to = _minus(place, corner)
-        yield _minus(_times(_dot(edge, edge), to), _times(_dot(to, edge), edge))
+        yield _minus(_times(dot(edge, edge), to), _times(dot(to, edge), edge))
         across = _cross(way, edge)
         yield from (across, _times(-1, across))
     yield from prism.normals
@@ -183,7 +183,7 @@ def _times(s: int, a: Vector) -> Vector:
     return s * a[0], s * a[1], s * a[2]
 
 
-def _dot(a: Vector, b: Vector) -> int:
+def dot(a: Vector, b: Vector) -> int:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -196,7 +196,7 @@ def _reduced(a: Vector) -> Vector:
     return a[0] // common, a[1] // common, a[2] // common
 
 
-def _root_up(square: int) -> int:
+def root_up(square: int) -> int:
     """The square root, rounded up."""
     root = isqrt(square)
     return root + (root * root < square)

@@ -18,7 +18,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.verify.proofs.export import Demand, Recorded, all_of, data, offs, ratio, real, stride
-from airground_drake.verify.proofs.separating import Prism, Vector, apart
+from airground_drake.verify.proofs.separating import Prism, Vector, apart, dot
 
 
 class Entry(NamedTuple):
@@ -68,7 +68,7 @@ def _windows(run: Recorded, demand: Demand) -> Iterator[tuple[int, int]]:
     first: int | None = None
     for row, (place, after) in enumerate(pairwise(way)):
         obeys = not near[row] or _obeys(run, safe, reach, place, after)
-        if first is None and obeys and (not near[row] or _dot(place, place) >= safe * safe):
+        if first is None and obeys and (not near[row] or dot(place, place) >= safe * safe):
             first = row
         if first is not None and not obeys:
             if row > first:
@@ -80,16 +80,12 @@ def _windows(run: Recorded, demand: Demand) -> Iterator[tuple[int, int]]:
 
 def _obeys(run: Recorded, safe: int, reach: int, place: Vector, after: Vector) -> bool:
     """Whether a step meets the law; see `step_meets` in LawChecker.v."""
-    squared = _dot(place, place)
+    squared = dot(place, place)
     if squared >= (safe + reach) ** 2:
         return True
     speed = run.gain.numerator if squared <= safe * safe else run.gain.denominator
-    along = run.gain.denominator * (_dot(place, after) - squared) + speed * squared
+    along = run.gain.denominator * (dot(place, after) - squared) + speed * squared
     return squared > 0 and along >= 0 and (speed * safe) ** 2 * squared <= along * along
-
-
-def _dot(a: Vector, b: Vector) -> int:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 _LAW = """\

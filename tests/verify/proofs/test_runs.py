@@ -28,11 +28,10 @@ from airground_drake.sim.trace import Trace
 from airground_drake.study.testing.plugin import Simulations
 from airground_drake.verify.claim import followed
 from airground_drake.verify.proofs import coq, export
-from airground_drake.verify.proofs.compare import broken_rules
 from airground_drake.verify.proofs.export import demands, distances_file, recorded, without_vectors
 from airground_drake.verify.proofs.readback import ReadbackError, compare
 from airground_drake.verify.proofs.record import closure
-from airground_drake.verify.proofs.runs import Workshop, expects_kept, prove
+from airground_drake.verify.proofs.runs import Workshop, broken_rules, expects_kept, prove
 from airground_drake.verify.proofs.table import too_near
 
 UGV, ROCK = "ugv1", "obstacle_1"
