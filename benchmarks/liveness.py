@@ -35,7 +35,8 @@ from airground_drake.scenario.load import from_data
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.engines.geometry import closest_approach
+from airground_drake.verify.engines.outlines import closest
+from airground_drake.verify.runs.pairs import CENTRE
 
 METHODS = ("a", "b", "c", "d", "orca")
 
@@ -114,7 +115,7 @@ def _of_trace(scenario: Scenario, trace: Trace) -> dict[str, Any]:
     paths = [trace.position(ugv) for ugv in trace.ugvs]
     found = _geometry(trace.t, paths, targets, obstacles)
     uav = trace.position(trace.robots[-1])
-    found["least_air_ground_m"] = min(closest_approach(trace.t, path, uav).distance_m for path in paths)
+    found["least_air_ground_m"] = min(closest(CENTRE, path - uav, planar=False).distance for path in paths)
     kinds = Counter(event["kind"] for event in trace.events)
     found["triggers"] = kinds["trigger"]
     found["messages"] = kinds["proposal"] + kinds["accept"] + kinds["refuse"]
@@ -145,8 +146,10 @@ def _geometry(t: Array, paths: list[Array], targets: Array, obstacles: Array) ->
     to_obstacles = itertools.product(paths, obstacles)
     return {
         "robots": robots,
-        "least_ugv_m": min((closest_approach(t, one, other).distance_m for one, other in pairs), default=None),
-        "least_obstacle_m": min((closest_approach(t, path, o).distance_m for path, o in to_obstacles), default=None),
+        "least_ugv_m": min((closest(CENTRE, one - other, planar=False).distance for one, other in pairs), default=None),
+        "least_obstacle_m": min(
+            (closest(CENTRE, path - o, planar=False).distance for path, o in to_obstacles), default=None
+        ),
     }
 
 

@@ -115,7 +115,8 @@ def end_on_signals() -> None:
             end_descendants()
             files.discard_partial()
             with suppress(OSError):
-                os.write(stderr, _line(number, clear=os.isatty(stderr)))
+                clear = "\r\033[K" if os.isatty(stderr) else ""  # on a terminal it replaces a line of progress
+                os.write(stderr, f"{clear}error: interrupted ({signal.Signals(number).name})\n".encode())
             _exit(128 + number)
         os._exit(128 + number)
 
@@ -163,12 +164,6 @@ def leave(code: int) -> NoReturn:
         with suppress(OSError, ValueError):  # a closed pipe or stream
             stream.flush()
     _exit(code)
-
-
-def _line(number: int, *, clear: bool) -> bytes:
-    """The message of an interruption; on a terminal it replaces a line of progress."""
-    before = "\r\033[K" if clear else ""
-    return f"{before}error: interrupted ({signal.Signals(number).name})\n".encode()
 
 
 def end_descendants() -> None:

@@ -50,7 +50,6 @@ class ProgressBar(Progress):
         self._lock = threading.RLock()
 
     def stage(self, name: str, amount: float = 0.0, unit: str = "") -> None:
-        """Replace the bar of the stage before."""
         self.close()
         self._stage, self._since, self._done = name, time.perf_counter(), 0.0
         self._of = f" of {amount:.4g} {unit}" if amount else ""

@@ -143,14 +143,10 @@ def parse_table(content: bytes, name: str) -> pd.DataFrame:
 
 def _is_plain_type(kind: pa.DataType) -> bool:
     """A number, a text, a list of numbers, or nothing."""
+    numbers = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
     listed = pa.types.is_list(kind) or pa.types.is_large_list(kind)
-    return _is_number_type(kind.value_type if listed else kind) or _is_text_type(kind)
+    return any(is_type(kind.value_type if listed else kind) for is_type in numbers) or _is_text_type(kind)
 
 
 def _is_text_type(kind: pa.DataType) -> bool:
     return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))
-
-
-def _is_number_type(kind: pa.DataType) -> bool:
-    of = (pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null)
-    return any(is_type(kind) for is_type in of)

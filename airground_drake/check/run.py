@@ -35,7 +35,6 @@ class Run:
 
     @cached_property
     def ugvs(self) -> list[str]:
-        """Names of the UGVs."""
         return list(self.scenario["ugvs"])
 
     @cached_property
@@ -113,7 +112,6 @@ class Run:
 
     @cached_property
     def moving(self) -> list[str]:
-        """Obstacles that move."""
         return moving_of(self.scenario)
 
     def apart(self, pair: Pair) -> Array:

@@ -157,7 +157,6 @@ class Shortfall(NamedTuple):
 
     @property
     def both(self) -> Fraction:
-        """The sum."""
         return self.own + self.other
 
 

@@ -148,7 +148,6 @@ def way_m(moves: Json, period_s: float, t_s: Array) -> Array:
 
 
 def _whole(periods: Any) -> Any:
-    """Rounded up."""
     return np.ceil(periods * (1.0 - PERIODS))
 
 
@@ -208,12 +207,10 @@ def _with_plants(pair: Pair, room: dict[str, Taken]) -> Pair:
 
 
 def radii_m(own: Json, other: Json) -> float:
-    """Sum of the radii of two bodies, m."""
     return float(own["radius_m"]) + float(other["radius_m"])
 
 
 def preset_of(scenario: Json, ugv: str) -> Preset:
-    """The preset trajectory of a UGV."""
     given = scenario["ugvs"][ugv]["preset"]
     corners = np.array(given["waypoints_m"], dtype=np.float64)
     legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)

@@ -102,7 +102,6 @@ class Shape:
     """One or more convex parts; places as in `Part`."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
-        """Make a shape from its parts."""
         self.parts = parts  # m of them
         # A corner of a box round each, (m, 3), m.
         self.low = np.array([[*part.begin.min(axis=0), part.base_m] for part in parts])
@@ -238,7 +237,6 @@ def _turn(a: Corner, b: Corner, c: Corner) -> float:
 
 
 def _turns(corners: Sequence[Corner]) -> list[float]:
-    """At each corner."""
     return [_turn(a, b, c) for (a, b), c in zip(edges_of(corners), [*corners[1:], corners[0]], strict=True)]
 
 

@@ -43,7 +43,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line."""
     # Exit code: 0 all as the scenario expects, 1 a claim differs, 2 usage, or a run or scenario that cannot be used.
     options = parser().parse_args(arguments)
     try:

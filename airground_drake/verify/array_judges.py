@@ -27,7 +27,7 @@ from airground_drake.model.geometry.encounter import least_apart
 from airground_drake.model.plants.first_order import FirstOrder
 from airground_drake.model.trigger import automaton
 from airground_drake.model.trigger.automaton import FIELDS, NEW, RELEASED, TRIGGERED, TRIGGERS, transitions_due
-from airground_drake.model.trigger.excursion import Corners, ranges, variables
+from airground_drake.model.trigger.excursion import Corners, gathered, ranges
 from airground_drake.sim.batch.loop import Log
 from airground_drake.sim.batch.run import Batch
 from airground_drake.verify.claim import MOTION_TOLERANCE_M, TIME_TOLERANCE_S
@@ -56,7 +56,6 @@ class ArrayJudges:
     """Judges the runs that the loop makes of a scenario; raises NoScreenError for scenarios that it cannot judge."""
 
     def __init__(self, batch: Batch) -> None:
-        """Set them up: all that does not depend on the run."""
         given, world = batch.given, batch.world
         robots = world.bodies[: len(world.robots)]
         if any(type(robot.plant) is not FirstOrder for robot in robots):
@@ -174,19 +173,13 @@ def least_of_pairs(bodies: Array, pairs: Indices, rows: Array, ugvs: int) -> Arr
 def signals_of(t: Array, bodies: Array, noise: Array, corners: Corners) -> Array:
     """Signals of the decision block at times (T,), s, as `excursion.gathered` gives them, (T, 1 + 5n)."""
     n = noise.shape[1]
-    signals, parts = np.empty((len(t), 1 + 5 * n)), np.empty((n, 4))
-    signals[:, 0] = t
+    signals, wanted = np.empty((len(t), 1 + 5 * n)), np.empty((len(t), 3 * n))
     for j in range(n):
         own = slice(corners.first[j], corners.first[j + 1])
         for a in range(3):
-            wanted = np.interp(t, corners.own_times[own], corners.places[own, a])
-            for k in range(len(t)):
-                signals[k, 1 + 5 * j + a] = wanted[k] - bodies[k, 3 * j + a]
-        signals[:, 4 + 5 * j] = noise[:, j]
+            wanted[:, 3 * j + a] = np.interp(t, corners.own_times[own], corners.places[own, a])
     for k in range(len(t)):
-        for j in range(n):
-            parts[j] = signals[k, 1 + 5 * j : 5 + 5 * j]
-        signals[k, 5::5] = variables(parts)
+        signals[k] = gathered(t[k], bodies[k], wanted[k], noise[k])
     return signals
 
 

@@ -12,7 +12,7 @@ import os
 import platform
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -74,13 +74,7 @@ def code_digest(package: Path) -> str:
 
 @cache
 def _engines() -> dict[str, str]:
-    installed = {"python": platform.python_version()}
-    for name in ENGINES:
-        try:
-            installed[name] = version(name)
-        except PackageNotFoundError:
-            installed[name] = "not installed"
-    return installed
+    return {"python": platform.python_version()} | {name: version(name) for name in ENGINES}
 
 
 def _read(path: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:

@@ -11,9 +11,9 @@ from itertools import combinations, product
 from typing import Any, NamedTuple
 
 from airground_drake.base.exact import decimal
-from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance
+from airground_drake.model.plants.budget import AT_REST, law_distance
 from airground_drake.scenario.plants import bounds_of, plant_of
-from airground_drake.scenario.schema import Control, Scenario, Uav, Ugv
+from airground_drake.scenario.schema import Scenario
 
 # By kind of pair, the parts of an inequality that its two bodies take; an obstacle stands still and takes none.
 KINDS = {"air_ground": "uav_ugv", "ugv": "ugv_ugv", "uav": "uav_uav"}  # by `Scenario.pair_of`, of two robots
@@ -94,13 +94,17 @@ def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
 def _kinds(scenario: Scenario) -> Iterator[PairKind]:
     """The extreme pairs of each kind in `SHARES`: the hypotheses hold for all pairs if they hold for these."""
     # Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
-    about = scenario.control, scenario.position_error_m
-    robots = {name: _Robot.of(robot, *about) for name, robot in scenario.robots.items()}
-    asked = {(pair.kind, robots[pair.first], robots.get(pair.second), *pair[3:]) for pair in apart(scenario)}
+    control, robots = scenario.control, scenario.robots
+    bounds = {name: bounds_of(robot, control.period_s, scenario.position_error_m) for name, robot in robots.items()}
     pairs: dict[str, set[tuple[Fraction, Fraction]]] = {kind: set() for kind in SHARES}
-    for kind, own, other, required, (_, radius) in asked:
+    asked = {(pair.kind, bounds[pair.first], bounds.get(pair.second, AT_REST), *pair[3:]) for pair in apart(scenario)}
+    for kind, own, other, required, radii in asked:
         if kind in pairs:
-            pairs[kind].add(own.beside(other, decimal(required) + (own.radius_m + decimal(radius))))
+            distance = decimal(required) + sum(map(decimal, radii), Fraction(0))
+            if not (own.exact and other.exact):  # rounded to a float, with what the plants take
+                law = law_distance(float(distance), own, other, gain=control.avoidance_gain_1_s)
+                distance = decimal(float(law))
+            pairs[kind].add((distance, decimal(own.speed_m_s) + decimal(other.speed_m_s)))
     for kind, both in pairs.items():
         kept: list[tuple[Fraction, Fraction]] = []
         for pair in sorted(both, reverse=True):
@@ -110,29 +114,3 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
             nearest = min(both, key=lambda pair: (pair[0], -pair[1]))
             kept += [nearest] if nearest not in kept else []
         yield from (PairKind(kind, *pair) for pair in kept)
-
-
-class _Robot(NamedTuple):
-    """Its radius, its speed limit, what its plant takes, and the gain of the law."""
-
-    radius_m: Fraction
-    speed_m_s: Fraction
-    bounds: Bounds
-    gain_1_s: float
-
-    @classmethod
-    def of(cls, robot: Ugv | Uav, control: Control, error_m: float) -> _Robot:
-        bounds = bounds_of(robot, control.period_s, error_m)
-        return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), bounds, control.avoidance_gain_1_s)
-
-    def beside(self, other: _Robot | None, safe_m: Fraction) -> tuple[Fraction, Fraction]:
-        """Distance in the law, m, and closing speed, m/s, beside another robot, or None, a set at rest."""
-        if other is None:
-            return self._in_the_law(safe_m, AT_REST), self.speed_m_s
-        return self._in_the_law(safe_m, other.bounds), self.speed_m_s + other.speed_m_s
-
-    def _in_the_law(self, safe_m: Fraction, other: Bounds) -> Fraction:
-        """The safe distance and what the plants take, rounded to a float; exact if they take nothing."""
-        if self.bounds.exact and other.exact:
-            return safe_m
-        return decimal(float(law_distance(float(safe_m), self.bounds, other, gain=self.gain_1_s)))

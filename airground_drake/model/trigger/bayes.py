@@ -29,9 +29,7 @@ def bayes_risk(zeta: float, drift: float, noise: float, c1: float, c2: float, de
 
 def optimal_threshold(drift: float, noise: float, c1: float, c2: float) -> float:
     """Threshold, m, that minimises the Bayes risk without initial deviation: (19) with c2/c1 on the right."""
-    for name, value in {"drift": drift, "noise": noise, "c1": c1, "c2": c2}.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise ValueError(f"{name} must be positive and finite, got {value!r}")
+    _need_positive(drift=drift, noise=noise, c1=c1, c2=c2)
     scale = 2.0 * drift / noise**2
     level = c2 / c1 * drift**2 / noise**2
 
@@ -66,9 +64,13 @@ def _bias(zeta: float, drift: float, noise: float, deviation: float) -> float:
     return share / -math.expm1(-2.0 * u)
 
 
-def _check(zeta: float, drift: float, noise: float, deviation: float) -> None:
-    for name, value in {"zeta": zeta, "drift": drift, "noise": noise}.items():
+def _need_positive(**numbers: float) -> None:
+    for name, value in numbers.items():
         if not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} must be positive and finite, got {value!r}")
+
+
+def _check(zeta: float, drift: float, noise: float, deviation: float) -> None:
+    _need_positive(zeta=zeta, drift=drift, noise=noise)
     if not abs(deviation) < zeta:
         raise ValueError(f"the initial deviation {deviation!r} m must lie inside the thresholds +-{zeta!r} m")

@@ -84,7 +84,8 @@ def world(text: str, source: str) -> Gazebo:
             left_out.append(f"{name}, which a plug-in moves")
             continue
         state = states.get(model.get("name"))
-        reader = _Reader(source, name, _scale(state, source))
+        scale = None if state is None else state.find("scale")
+        reader = _Reader(source, name, (1.0, 1.0, 1.0) if scale is None else _numbers(scale, 3, source))
         pose = reader.pose(model if state is None or state.find("pose") is None else state)
         solids += reader.model(model, pose)
         left_out += reader.left_out
@@ -173,11 +174,6 @@ def _others(of: ElementTree.Element, *read: str) -> Iterator[str]:
             yield f"<include> of {_text(body, 'uri')}" + (f" as {name}" if name else "")
         else:
             yield name if body.tag == "model" and name else f"<{body.tag}> {name}".strip()
-
-
-def _scale(state: ElementTree.Element | None, source: str) -> tuple[float, ...]:
-    scale = None if state is None else state.find("scale")
-    return (1.0, 1.0, 1.0) if scale is None else _numbers(scale, 3, source)
 
 
 def _numbers(of: ElementTree.Element, count: int, source: str) -> tuple[float, ...]:

@@ -84,7 +84,7 @@ def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
         _add_borders(edges, ways, space, places, seeds, size)
         own = np.flatnonzero(sizes == size)
         leaving += _from_starts(ways, space, places, seeds, own, starts, size, width)
-    every = [directed for edge in edges.values() for directed in (edge, _reversed(edge))]
+    every = [*edges.values(), *(_Edge(edge.head, edge.tail, edge.size, edge.line[::-1]) for edge in edges.values())]
     every += [edge._replace(tail=len(seeds) + edge.tail) for edge in leaving]
     graph, largest = _graph(np.concatenate([places[seeds], places[starts]]), every, len(spaces))
     usable = largest[None, :] <= sizes[:, None]
@@ -211,10 +211,6 @@ def _back(before: npt.NDArray[np.int32], node: int) -> list[int]:
     while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
     return path
-
-
-def _reversed(edge: _Edge) -> _Edge:
-    return edge._replace(tail=edge.head, head=edge.tail, line=edge.line[::-1])
 
 
 def _length(line: Array) -> float:

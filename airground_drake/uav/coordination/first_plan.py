@@ -105,7 +105,9 @@ class _Search:
     def _make(self) -> tuple[Coarse, Team, float]:
         if self._made is None:
             coarse = coarsened(self._movers, self._width)
-            step = _step(coarse, self._movers)
+            longest = [float(coarse.graph.lengths[can].max()) for can in coarse.usable]
+            # every robot can travel every edge that it can use in a step
+            step = max(length / mover.speed for length, mover in zip(longest, self._movers, strict=True))
             shut = _shut(coarse, self._movers, self._fixed, step)
             apart = np.array([[own.space.apart + other.task.body for other in self._movers] for own in self._movers])
             to_go = _to_go(coarse, shut, WAITING * self._width)
@@ -148,12 +150,6 @@ def _way(mover: Mover, motion: Array) -> Way:
         return Way(motion, float(motion[-1, 0]), len(motion))
     motion = without_repeats(np.concatenate([motion, [[end, *motion[-1, 1:]]]]))
     return Way(motion, end, len(motion))
-
-
-def _step(coarse: Coarse, movers: Sequence[Mover]) -> float:
-    """Duration in which every robot can travel every edge that it can use, s."""
-    lengths = coarse.graph.lengths
-    return max(float(lengths[can].max()) / mover.speed for can, mover in zip(coarse.usable, movers, strict=True))
 
 
 def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], step: float) -> npt.NDArray[np.bool_]:

@@ -112,13 +112,11 @@ def smooth(
         for i, way in enumerate(smoothed):
             if way is None:
                 continue
-            others = [*fixed, *(_moving(other, rests[j]) for j, other in enumerate(smoothed) if j != i)]
+            moving = [rest if own is None else rest._replace(motion=own.motion)
+                      for own, rest in zip(smoothed, rests, strict=True)]  # fmt: skip
+            others = [*fixed, *moving[:i], *moving[i + 1 :]]
             smoothed[i] = _straightened(spaces[i], way, others)
     return smoothed
-
-
-def _moving(way: Way | None, rest: OtherRobot) -> OtherRobot:
-    return rest if way is None else rest._replace(motion=way.motion)
 
 
 def _straightened(space: Space, way: Way, others: Sequence[OtherRobot]) -> Way:

@@ -190,7 +190,6 @@ class Judge:
     tolerance: float
 
     def decisions(self, events: Sequence[Transition], dwell: float) -> Iterator[Decided]:
-        """All decisions of a run."""
         for watch in watches(events, dwell, float(self.e.t[0]), float(self.e.t[-1])):
             yield from self._of_watch(watch)
 

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from airground_drake.base.arrays import Array, Indices
-from airground_drake.model.bodies.motion import PeriodMotion
 
 # Rows closer than this are one instant, s: periods that are not binary fractions give simulator steps of 1e-17 s, and
 # at 10 m/s a robot moves 1e-8 m meanwhile.
@@ -28,19 +27,6 @@ class Approach(NamedTuple):
     distance_m: float  # the minimum
     t_s: float  # the earliest time at which it is attained, inside [t[row-1], t[row]]
     row: int  # row that ends the segment on which it is attained (0 only for a single row)
-
-
-def closest_approach(t: Array, first: Array, second: Array, off_m: float = 0.0) -> Approach:
-    """Minimum distance between two points that move at the same time on straight segments, as (7) defines D."""
-    # t: (T,), s; first, second: (T, 3), m
-    # off_m: how far from the straight segments both may be, together, m: the minimum is then a lower bound.
-    # Returns the minimum over [t[0], t[-1]], its time and its row.
-    relative = first - second
-    if len(t) == 1:
-        return Approach(float(np.linalg.norm(relative[0])), float(t[0]), 0)
-    distance, fraction = PeriodMotion(relative[:-1], relative[1:], off_m).least_distance()
-    k = int(np.argmin(distance))
-    return Approach(float(distance[k]), instant_of(t, k + 1, float(fraction[k])), k + 1)
 
 
 def instant_of(t: Array, row: int, share: float) -> float:

@@ -58,11 +58,10 @@ def shortfalls(
     other = np.broadcast_to(second, first.shape)
     missed = np.zeros(len(first) - 1)
     pair = _Pair(core, planar, Fraction(d), share, gain, held)
-    for k in (_doubtful if seen is None else _near)(first, other, pair, float(last)).tolist():
-        ends = np.stack([first[k], first[k + 1], other[k], other[k] if held else other[k + 1]])
-        lasts = last if k == len(missed) - 1 else Fraction(1)
-        of_step = _shortfall(ends, pair, lasts) if seen is None else _shortfall_seen(ends, seen, k, pair, lasts)
-        missed[k] = rounded_up(of_step)
+    for k in _doubtful(first, other, pair, float(last), by_law=seen is None).tolist():
+        places = [first[k], first[k + 1], other[k], other[k] if held else other[k + 1]]
+        places += [] if seen is None else [seen[0][k], seen[1][k]]
+        missed[k] = rounded_up(_shortfall(np.stack(places), pair, last if k == len(missed) - 1 else Fraction(1)))
     return missed
 
 
@@ -83,13 +82,13 @@ class _Pair(NamedTuple):
     held: bool
 
 
-def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> Indices:
-    """Samples that floats find neither far nor met by more than `SCREEN_M`: their numbers."""
+def _doubtful(first: Array, other: Array, pair: _Pair, last: float, *, by_law: bool) -> Indices:
+    """Samples that floats find neither far nor, `by_law`, met by more than `SCREEN_M`: their numbers."""
     distance, normal = away_from(pair.core, (first - other)[:-1], planar=pair.planar)
     normal[~normal.any(axis=1)] = np.nan
     d, share = float(pair.d), float(pair.share)
     bound = demanded(d - distance, float(pair.gain), 1.0)
-    met = np.ones(len(distance), dtype=np.bool_)
+    met = np.full(len(distance), by_law)
     reach = np.zeros(len(distance))
     for body, sign, part in ((first, 1.0, share), (other, -1.0, 1.0 - share)):
         step = np.zeros_like(body[1:]) if pair.held and sign < 0.0 else np.diff(body, axis=0)
@@ -100,57 +99,31 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float) -> Indices:
     return np.flatnonzero((distance - d - reach <= SCREEN_M) & ~met)
 
 
-def _near(first: Array, other: Array, pair: _Pair, last: float) -> Indices:
-    """Samples at which a pair is not far: their numbers."""
-    distance, _ = away_from(pair.core, (first - other)[:-1], planar=pair.planar)
-    reach = np.zeros(len(distance))
-    for body in (first, other):
-        step = np.diff(body, axis=0)
-        step[-1] /= last
-        reach += np.linalg.norm(step, axis=1)
-    return np.flatnonzero(distance - float(pair.d) - reach <= SCREEN_M)
-
-
-def _shortfall_seen(ends: Array, seen: tuple[Array, Array], k: int, pair: _Pair, lasts: Fraction) -> Fraction:
-    """e of sample k, at which the law acted on measured places (K, 3), m, from above; `ends` (4, 3), m."""
-    places = np.concatenate([ends, [seen[0][k], seen[1][k]]])
-    (here, after, there, beyond, own, other), shape, unit = _in_units(places, pair.core)
-    steps = (_minus(after, here), _minus(beyond, there))
-    if not any(map(any, steps)):  # both stand
+def _shortfall(places: Array, pair: _Pair, lasts: Fraction) -> Fraction:
+    """e of one sample, from above, m."""
+    # places: of the first body at the sample and at the next, and of the second; and of both at the sample as measured,
+    # if the law acted on these: (4, 3) or (6, 3), m. Then the pair meets the law together.
+    (here, after, there, beyond, *seen), shape, unit = _in_units(places, pair.core)
+    steps = (_minus(after, here), _minus(there, beyond))
+    if seen and not any(map(any, steps)):  # both stand
         return Fraction(0)
-    reach = sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
-    if _apart(_ways_off(shape, _minus(here, there), pair.planar, unit)) >= pair.d + reach:
-        return Fraction(0)
-    ways = _ways_off(shape, _minus(own, other), pair.planar, unit)
-    if not ways:
-        return pair.gain * pair.d + reach
-    apart = _apart(ways)
-    bound = demanded(pair.d - apart, pair.gain, Fraction(1))
-    totals = list[Fraction]()
-    for way in ways:
-        along = Fraction(_dot(way.normal, _minus(*steps)), unit) / lasts
-        least = min(along / length for length in _length(way.normal, 1))
-        totals.append(apart - way.apart + max(bound - least, Fraction(0)))
-    return min(totals)
-
-
-def _shortfall(ends: Array, pair: _Pair, lasts: Fraction) -> Fraction:
-    """e_1 + e_2 of one sample, from above; `ends` (4, 3), m."""
-    (here, after, there, beyond), shape, unit = _in_units(ends, pair.core)
-    steps = (_minus(after, here), _minus(beyond, there))
     ways = _ways_off(shape, _minus(here, there), pair.planar, unit)
-    apart = _apart(ways)
     reach = sum((_length(step, unit)[1] for step in steps), Fraction(0)) / lasts
-    if apart >= pair.d + reach:
+    if _apart(ways) >= pair.d + reach:
         return Fraction(0)
+    asked = [(steps[0], pair.share), (steps[1], 1 - pair.share)]
+    if seen:
+        ways = _ways_off(shape, _minus(*seen), pair.planar, unit)
+        asked = [([a + b for a, b in zip(*steps, strict=True)], Fraction(1))]
     if not ways:  # n is unknown: along any n a step is at least minus its length
         return pair.gain * pair.d + reach
+    apart = _apart(ways)
     bound = demanded(pair.d - apart, pair.gain, Fraction(1))  # it decreases with the distance
     totals = list[Fraction]()
     for way in ways:
         missed = apart - way.apart
-        for step, sign, part in zip(steps, (1, -1), (pair.share, 1 - pair.share), strict=True):
-            along = Fraction(sign * _dot(way.normal, step), unit) / lasts
+        for step, part in asked:
+            along = Fraction(_dot(way.normal, step), unit) / lasts
             missed += max(part * bound - min(along / length for length in _length(way.normal, 1)), Fraction(0))
         totals.append(missed)
     return min(totals)

@@ -25,7 +25,6 @@ class CoqError(AirgroundError):
     """Coq does not accept a file, or a theorem rests on more than is allowed."""
 
     def __init__(self, message: str, line: int = 0) -> None:
-        """Keep the message in one line."""
         super().__init__(one_line(message))
         self.line = line  # of the file, from 1; 0 if unknown
 
@@ -128,7 +127,6 @@ def check_again(modules: Sequence[str], folder: Path, limit_s: float = LIMIT_S) 
 
 
 def _run(command: list[str], folder: Path, limit_s: float) -> subprocess.CompletedProcess[str]:
-    """Run a tool of Coq."""
     try:
         return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=limit_s, check=False)
     except subprocess.TimeoutExpired:

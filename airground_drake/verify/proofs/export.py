@@ -140,7 +140,10 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
     refuse_unknown(trace)
     scenario, control = trace.scenario, trace.scenario.control
     barriers = scenario.barriers
-    places: dict[str, tuple[Place, ...]] = {name: (_centre(obstacle),) for name, obstacle in barriers.items()}
+    places: dict[str, tuple[Place, ...]] = {}
+    for name, obstacle in barriers.items():  # corners are given in the frame of the world, or that of what moves
+        is_ball = convex_parts(obstacle) is None
+        places[name] = (_rounded((is_ball and obstacle.position_m) or (0.0, 0.0, 0.0)),)
     moving = [name for name, obstacle in barriers.items() if obstacle.moves]
     of = trace.position if steered else trace.body
     places |= {name: tuple(map(_rounded, of(name).tolist())) for name in (*moving, *trace.robots)}
@@ -181,11 +184,6 @@ def refuse_unknown(trace: Trace) -> None:
         if name in trace.robots and (why := trace.plant(name).unproved):
             kinds = " and ".join(keys.kind for keys in trace.scenario.robots[name].plant)
             raise TraceError(f"run {trace.run}: {name} has the plant {kinds}; {why}")
-
-
-def _centre(obstacle: Obstacle) -> Place:
-    """The centre of a ball; corners of other shapes are given in the frame of the world, or that of what moves."""
-    return _rounded(obstacle.position_m if convex_parts(obstacle) is None and obstacle.position_m else (0.0, 0.0, 0.0))
 
 
 def _sets(obstacle: Obstacle, core: str) -> tuple[ConvexSet, ...]:
@@ -293,10 +291,8 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
     checks = _DISTANCES.format(
         run=run.name, interval=interval, start=ratio(run.times[0]), end=ratio(run.times[-1])
     )  # fmt: skip
-    together = _theorem(f"{run.name}_keeps_its_distances", f"forall t, {interval} ->", _grouped(run.demands, claims))
-    proofs = _grouped(run.demands, [f"({demand.lemma} t T)" for demand in run.demands])
-    proof = all_of([all_of(group) for group in proofs])
     bodies, theorem = "", f"{run.name}_keeps_its_distances"
+    together = _together(run.demands, theorem, interval, claims, "")
     if run.off_m:
         bodies, theorem = _bodies(run, interval), f"{run.name}_bodies_keep_their_distances"
     return (
@@ -304,7 +300,7 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
         "Require Import Reals Lra ZArith List.\nRequire Import Safety Convex Run DistanceChecker.\n"
         f"Import ListNotations.\nLocal Open Scope Z_scope.\n\n{data(run)}{checks}{lemmas}"
         "(** All pairs: distances of centres, which are the safe distance and both radii, in m; times in s. *)\n"
-        f"{together}Proof. intros t T; exact {proof}. Qed.\n\n{bodies}"
+        f"{together}{bodies}"
         f"Print Assumptions {theorem}.\n"
     )
 
@@ -348,15 +344,8 @@ def _bodies(run: Recorded, interval: str) -> str:
         f"Proof. decide_bodies {demand.first} {demand.second} {demand.lemma}. Qed.\n\n"
         for demand, claim in zip(run.demands, claims, strict=True)
     )
-    proofs = _grouped(run.demands, [f"(bodies_{demand.lemma} t T)" for demand in run.demands])
-    together = _theorem(
-        f"{run.name}_bodies_keep_their_distances", f"forall t, {interval} ->", _grouped(run.demands, claims)
-    )
-    proof = all_of([all_of(group) for group in proofs])
-    return (
-        f"{offs(run)}{_BODIES.format(run=run.name)}{lemmas}{together}"
-        f"Proof. intros t T; exact {proof}. Qed.\n\nEnd Bodies.\n\n"
-    )
+    together = _together(run.demands, f"{run.name}_bodies_keep_their_distances", interval, claims, "bodies_")
+    return f"{offs(run)}{_BODIES.format(run=run.name)}{lemmas}{together}End Bodies.\n\n"
 
 
 def _body_claim(run: Recorded, demand: Demand) -> str:
@@ -395,9 +384,12 @@ def _grouped(demands: Sequence[Demand], texts: Sequence[str]) -> list[list[str]]
     return [[text for _, text in group] for _, group in pairs]
 
 
-def _theorem(name: str, quantifier: str, groups: Sequence[Sequence[str]]) -> str:
-    together = " /\\\n  ".join("(" + " /\\\n   ".join(group) + ")" for group in groups)
-    return f"Theorem {name} : {quantifier}\n  {together}.\n"
+def _together(demands: Sequence[Demand], name: str, interval: str, claims: Sequence[str], prefix: str) -> str:
+    """The theorem of all claims, from the lemmas about them."""
+    groups = " /\\\n  ".join("(" + " /\\\n   ".join(group) + ")" for group in _grouped(demands, claims))
+    lemmas = _grouped(demands, [f"({prefix}{demand.lemma} t T)" for demand in demands])
+    proof = all_of([all_of(group) for group in lemmas])
+    return f"Theorem {name} : forall t, {interval} ->\n  {groups}.\nProof. intros t T; exact {proof}. Qed.\n\n"
 
 
 def all_of(proofs: Sequence[str]) -> str:

@@ -14,7 +14,13 @@ from typing import NamedTuple
 from airground_drake.base.errors import AirgroundError
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.proofs.export import PARTS, Demand, demands, demands_of, off_m
+from airground_drake.verify.proofs.export import PARTS, demands, demands_of, off_m
+
+_NUMBER = r"(\d+|\(\d+ / \d+\))"
+_SAFE = r"(?P<safe>\d+|\(\d+ / \d+\))"
+_FIRST, _SECOND, _SETS = r"(?P<first>\w+)", r"(?P<second>\w+)", r"(?P<sets>\w+)"
+
+Claim = tuple[str, str, str, Fraction]  # two bodies, the sets that are the second one or '', and their distance
 
 
 class ReadbackError(AirgroundError):
@@ -32,10 +38,20 @@ def compare(text: str, trace: Trace) -> RereadError:
     """Compare the file about distances with the run that it should be about."""
     spelled, error = compare_positions(text, trace)
     named = [pair._replace(first=spelled[pair.first], second=spelled[pair.second]) for pair in demands_of(trace)]
+    run = f"run_{trace.run}"
+    balls = rf"{_SAFE} <= norm \(sub \(position {run} {_FIRST} t\) \(position {run} {_SECOND} t\)\)"
     wanted = [(pair.first, pair.second, pair.sets if pair.core else "", pair.safe_m) for pair in named]
-    _compare_statement(f"run_{trace.run}", text, trace, wanted)
+    clear = rf"clear {run} {_FIRST} {_SECOND} {_SETS} {_SAFE} t"
+    _compare_theorem(f"{run}_keeps_its_distances", text, trace, (balls, clear), wanted)
     if any(trace.is_apart(name) for name in trace.robots):
-        _compare_bodies(f"run_{trace.run}", text, trace, named)
+        balls = rf"{_SAFE} <= norm \(sub \(x {_FIRST} t\) \(x {_SECOND} t\)\)"
+        sets = rf"forall corners c, In corners {_SETS} -> hull \(map \(place_in {run}\) corners\) c -> "
+        sets += rf"{_SAFE} <= norm \(sub \(x {_FIRST} t\) \(add \(x {_SECOND} t\) c\)\)"
+        wanted = [(*pair[:3], demand.body_m) for pair, demand in zip(wanted, named, strict=True)]
+        _compare_theorem(f"{run}_bodies_keep_their_distances", text, trace, (balls, sets), wanted)
+        near = f"Hypothesis near_lines : forall i t, norm (sub (x i t) (position {run} i t)) <= {run}_off i."
+        if near not in text:
+            raise ReadbackError(f"{run}: the theorem about bodies is not about all that are near their lines")
     return error
 
 
@@ -104,47 +120,18 @@ def _points(text: str, unit: int) -> list[list[Fraction]]:
     return [[Fraction(int(axis.strip("()"), 0), unit) for axis in point] for point in points]
 
 
-def _compare_statement(run: str, text: str, trace: Trace, wanted: Sequence[tuple[str, str, str, Fraction]]) -> None:
-    """The theorem at the end is about all of the run's time and every pair, with its full distance."""
-    number = r"(\d+|\(\d+ / \d+\))"
-    start, end, body = _parts(
-        rf"^Theorem {run}_keeps_its_distances : forall t, {number} <= t <= {number} ->\n(.*?)\.\nProof\.", text
-    )
+def _compare_theorem(theorem: str, text: str, trace: Trace, kinds: Sequence[str], wanted: Sequence[Claim]) -> None:
+    """The theorem is about all of the run's time and every pair, with its full distance."""
+    # kinds: patterns of claims, each with the groups `first`, `second` and `safe`, and `sets` where there are any.
+    start, end, body = _parts(rf"^Theorem {theorem} : forall t, {_NUMBER} <= t <= {_NUMBER} ->\n(.*?)\.\nProof\.", text)
     if [_value(start), _value(end)] != [Fraction(trace.t[0]), Fraction(trace.t[-1])]:
-        raise ReadbackError(f"{run}: the theorem is not about all of the run's time")
-    balls = rf"{number} <= norm \(sub \(position {run} (\w+) t\) \(position {run} (\w+) t\)\)"
-    claim = re.compile(rf"{balls}|clear {run} (\w+) (\w+) (\w+) {number} t")
-    claims = [
-        (own or first, other or second, sets, _value(apart or safe))
-        for apart, own, other, first, second, sets, safe in claim.findall(body)
-    ]
-    between = claim.sub("", body)  # has to be conjunctions and their parentheses alone
-    if claims != list(wanted) or re.sub(r"[\s()]", "", between) != "/\\" * (len(claims) - 1):
-        raise ReadbackError(f"{run}: the theorem does not claim the scenario's distance of every pair")
-
-
-def _compare_bodies(run: str, text: str, trace: Trace, wanted: Sequence[Demand]) -> None:
-    """The theorem about the bodies is about every pair and its distance, and about all that are near their lines."""
-    start, end, body = _parts(
-        rf"^Theorem {run}_bodies_keep_their_distances : forall t, (.*?) <= t <= (.*?) ->\n(.*?)\.\nProof\.", text
-    )
-    number = r"(\d+|\(\d+ / \d+\))"
-    balls = rf"{number} <= norm \(sub \(x (\w+) t\) \(x (\w+) t\)\)"
-    sets = (
-        rf"forall corners c, In corners (\w+) -> hull \(map \(place_in {run}\) corners\) c -> "
-        rf"{number} <= norm \(sub \(x (\w+) t\) \(add \(x (\w+) t\) c\)\)"
-    )
-    claim = re.compile(rf"{sets}|{balls}")
-    claims = [
-        (own or first, other or second, of, _value(least or apart))
-        for of, least, own, other, apart, first, second in claim.findall(body)
-    ]
-    expected = [(demand.first, demand.second, demand.sets if demand.core else "", demand.body_m) for demand in wanted]
-    between = re.sub(r"[\s()]", "", claim.sub("", body))
-    whole = [_value(start), _value(end)] == [Fraction(trace.t[0]), Fraction(trace.t[-1])]
-    near = f"Hypothesis near_lines : forall i t, norm (sub (x i t) (position {run} i t)) <= {run}_off i."
-    if claims != expected or between != "/\\" * (len(claims) - 1) or not whole or near not in text:
-        raise ReadbackError(f"{run}: the theorem about bodies does not claim the scenario's distance of every pair")
+        raise ReadbackError(f"{theorem} is not about all of the run's time")
+    matches = sorted((match for kind in kinds for match in re.finditer(kind, body)), key=re.Match.start)
+    claims = [(m["first"], m["second"], m.groupdict().get("sets", ""), _value(m["safe"])) for m in matches]
+    for kind in kinds:  # what is left has to be conjunctions and their parentheses alone
+        body = re.sub(kind, "", body)
+    if claims != wanted or re.sub(r"[\s()]", "", body) != "/\\" * (len(claims) - 1):
+        raise ReadbackError(f"{theorem} does not claim the scenario's distance of every pair")
 
 
 def _value(text: str) -> Fraction:

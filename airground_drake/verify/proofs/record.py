@@ -77,12 +77,10 @@ def _doubt(record: Mapping[str, Any], names: tuple[str, ...], theory: Mapping[st
 
 
 def file_of(theorem: str) -> str:
-    """The file of a theorem, by its name."""
     return theorem.partition(".")[0] + ".v"
 
 
 def digest(file: Path) -> str:
-    """SHA-256 of a file."""
     return files.sha256(file.read_bytes())
 
 

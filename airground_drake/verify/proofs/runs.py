@@ -113,13 +113,10 @@ def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: st
     if not law.proved:
         return replace(law, missed=gaps)
     law = replace(law, entries=len(table), missed=gaps)
-    return replace(law, proved=False, why=_missing(gaps, len(table))) if gaps else law
-
-
-def _missing(gaps: Sequence[Missed], many: int) -> str:
-    """Which pairs miss the law, and when."""
+    if not gaps:
+        return law
     pairs = (f"{' and '.join(gap.demand.called)}, {gap.begin_s:.6g} to {gap.end_s:.6g} s" for gap in gaps)
-    return f"{'; '.join(pairs)}. Proved of the other periods, in {many} entries"
+    return replace(law, proved=False, why=f"{'; '.join(pairs)}. Proved of the other periods, in {len(table)} entries")
 
 
 @contextmanager

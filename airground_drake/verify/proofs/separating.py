@@ -29,7 +29,6 @@ class Prism(NamedTuple):
 
     @property
     def levels(self) -> list[int]:
-        """The heights of its corners."""
         return [*dict.fromkeys((self.base, self.top))]
 
     @property

@@ -16,6 +16,7 @@ from airground_drake.verify.engines.outlines import Cores, Indices, apart_by_blo
 from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
 from airground_drake.verify.runs.pairs import (
     BENT_M,
+    CENTRE,
     DISTANCE_TOLERANCE_M,
     MOST_PARTS,
     Gap,
@@ -76,7 +77,7 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     other = pair.second if robot == pair.first else pair.first
     rows = np.arange(len(trace.t) - 1)
     sample = samples_before(trace)
-    cores = cores_of(trace).get(other, Cores.at(np.zeros((1, 3))))
+    cores = cores_of(trace).get(other, CENTRE)
     place = trace.body(robot)
     origin = origin_of(trace, other)
     planar = is_planar(trace, robot)
@@ -183,7 +184,7 @@ def _encounter(trace: Trace, least: Gap) -> Encounter:
     t_s = float(trace.t[hits[0]]) if len(hits) else least.t_s
     appeared = pair.row > 0 and bool(gaps[pair.row] < pair.required_m - DISTANCE_TOLERANCE_M)
     doing = _whose_doing(trace, least)
-    drove_on = doing == "under way" or (doing == "nobody" and appeared and _is_late(trace, pair.first))
+    drove_on = doing == "under way" or (doing == "nobody" and appeared and bounds_of(trace)[pair.first].late)
     under_way_m = _way_m(trace, pair, gaps, least.t_s) if drove_on else 0.0
     encounter = Encounter(
         first=pair.first, second=pair.second, required_m=pair.required_m, gap_m=max(least.gap_m, 0.0), t_s=t_s,
@@ -200,16 +201,11 @@ def _whose_doing(trace: Trace, least: Gap) -> str:
         return "robot"
     taking = [robot for robot in robots if own[robot].of_body.min(initial=np.inf) < -DISTANCE_TOLERANCE_M]
     if taking:
-        return "under way" if any(_is_late(trace, robot) for robot in taking) else "robot"
+        return "under way" if any(bounds_of(trace)[robot].late for robot in taking) else "robot"
     if least.row <= _first_apart(pair, gap_over_time(trace, pair)):
         return "nobody"
     moved = np.ptp(origin_of(trace, pair.second)[pair.rows], axis=0).any()
     return "other" if moved and pair.second not in trace.robots else "robot"
-
-
-def _is_late(trace: Trace, robot: str) -> bool:
-    """Whether commands under way lead the body of a robot."""
-    return bounds_of(trace)[robot].late
 
 
 def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array, Flags
 from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance, part_of_gain
-from airground_drake.scenario.schema import MAP, Obstacle, Scenario
+from airground_drake.scenario.schema import MAP, Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.geometry import (
@@ -26,7 +26,6 @@ from airground_drake.verify.engines.geometry import (
     Approach,
     apart_at_least,
     boxes_of,
-    closest_approach,
     instant_of,
     interpolate,
 )
@@ -174,14 +173,11 @@ def parts_of(trace: Trace) -> Parts:
 @per_trace
 def cores_of(trace: Trace) -> dict[str, Cores]:
     """The cores of the convex parts of each barrier, by its name."""
-    return {name: _cores(barrier) for name, barrier in trace.scenario.barriers.items()}
-
-
-def _cores(obstacle: Obstacle) -> Cores:
-    parts = convex_parts(obstacle)
-    if parts is None:
-        return Cores.at(np.array([obstacle.position_m or [0.0, 0.0, 0.0]], dtype=np.float64))
-    return Cores.prisms(parts, obstacle.height_m)
+    cores = dict[str, Cores]()
+    for name, barrier in trace.scenario.barriers.items():
+        parts, place = convex_parts(barrier), np.array([barrier.position_m or [0.0, 0.0, 0.0]], dtype=np.float64)
+        cores[name] = Cores.at(place) if parts is None else Cores.prisms(parts, barrier.height_m)
+    return cores
 
 
 def origin_of(trace: Trace, name: str) -> Array:
@@ -253,15 +249,11 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
     # required; else it is a lower bound.
     t = trace.t[pair.rows]
     off_m = off_m_of(trace, pair.first) + off_m_of(trace, pair.second)
-    cores = cores_of(trace).get(pair.second)
-    if cores is None:
-        first, second = trace.body(pair.first), trace.body(pair.second)
-        distance, t_s, row = closest_approach(t, first[pair.rows], second[pair.rows], off_m)
-    else:
-        first = seen_from(trace, pair.first, pair.second)[pair.rows]
-        distance, row, share = closest(cores, first, planar=is_planar(trace, pair.first))
-        distance = max(distance - off_m, 0.0) if off_m and cores.are_points else distance - off_m
-        t_s = instant_of(t, row, share)
+    cores = cores_of(trace).get(pair.second, CENTRE)
+    way = seen_from(trace, pair.first, pair.second)[pair.rows]
+    distance, row, share = closest(cores, way, planar=is_planar(trace, pair.first))
+    distance = max(distance - off_m, 0.0) if off_m and cores.are_points else distance - off_m
+    t_s = instant_of(t, row, share)
     if off_m and distance < pair.safe_m:
         distance, t_s, row = _least_of_bent(trace, pair, off_m)
     return Gap(pair, distance - pair.radii_m, distance - pair.safe_m, t_s, row + pair.row)
@@ -287,18 +279,15 @@ def at_appearance(trace: Trace, gap: Gap) -> bool:
 @per_trace
 def steered_margin(trace: Trace, pair: Pair) -> float:
     """The least distance of the points of a pair that the law steers, less what the law keeps, m."""
-    cores = cores_of(trace).get(pair.second)
-    first = trace.position(pair.first)[pair.rows]
-    if cores is None:
-        second = trace.position(pair.second)[pair.rows]
-        return closest_approach(trace.t[pair.rows], first, second).distance_m - pair.law_m
-    way = first - origin_of(trace, pair.second)[pair.rows]
+    cores = cores_of(trace).get(pair.second, CENTRE)
+    second = trace.position(pair.second) if pair.second in trace.robots else origin_of(trace, pair.second)
+    way = (trace.position(pair.first) - second)[pair.rows]
     return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
 
 
 def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
-    cores = cores_of(trace).get(pair.second, Cores.at(np.zeros((1, 3))))
+    cores = cores_of(trace).get(pair.second, CENTRE)
     planar = is_planar(trace, pair.first)
     way = seen_from(trace, pair.first, pair.second)[pair.rows]
     beside = cores.take((slice(None), None))
@@ -468,6 +457,7 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     }
 
 
+CENTRE = Cores.at(np.zeros((1, 3)))  # the core of a robot, as seen from its place
 # Segments in which a body that does not move straight may be too near are divided until they are this straight, m.
 BENT_M = 1e-10
 MOST_PARTS = 5000  # parts of such a segment at most

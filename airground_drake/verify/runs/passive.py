@@ -63,7 +63,6 @@ class Periods(NamedTuple):
 
     @property
     def stood(self) -> Flags:
-        """Where it was passive and stood."""
         return self.passive & (np.linalg.norm(self.velocity, axis=1) <= STANDING_M_S)
 
     @property

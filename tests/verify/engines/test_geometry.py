@@ -11,18 +11,26 @@ from properties import examples
 
 from airground_drake.verify.engines.geometry import (
     ROWS,
+    Approach,
     NormSignal,
     apart_at_least,
     boxes_of,
-    closest_approach,
     corner_times,
+    instant_of,
     interpolate,
     travelled,
 )
-from airground_drake.verify.runs.pairs import least_of
+from airground_drake.verify.engines.outlines import closest
+from airground_drake.verify.runs.pairs import CENTRE, least_of
 
 COORDINATES = st.floats(-10.0, 10.0, allow_subnormal=False)
 PATHS = st.integers(2, 6).flatmap(lambda n: st.tuples(*[arrays(np.float64, (n, 3), elements=COORDINATES)] * 2))
+
+
+def closest_approach(t: np.ndarray, first: np.ndarray, second: np.ndarray) -> Approach:
+    """Where two points are nearest to each other."""
+    found = closest(CENTRE, first - second, planar=False)
+    return Approach(found.distance, instant_of(t, found.row, found.share), found.row)
 
 
 @examples(150)
