@@ -25,8 +25,8 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array, Flags, Indices, read_only
-from airground_drake.model.geometry import convex, outline
-from airground_drake.model.geometry.outline import BASE, CORNERS, COUNT, MIDDLE, TOP
+from airground_drake.model.geometry import convex
+from airground_drake.model.geometry.outline import BASE, CORNERS, COUNT, EXTENT, MIDDLE, TOP
 from airground_drake.model.geometry.separation import are_separated
 
 Points = NDArray[np.complex128]
@@ -157,34 +157,35 @@ def _need_finite(*given: ArrayLike) -> None:
 class _Obstacles:
     """What a path keeps out of."""
 
-    c: Points  # centres of discs, (m,)
-    r: Array  # their radii, (m,), m
-    rows: Array  # outlines of walls and polygons, (k, W), at height 0
-    keep: Array  # distances from their cores, (k,), m
+    rows: Array  # outlines at height 0, (m, W): discs, then walls and polygons
+    keep: Array  # distances from their cores, (m,), m
 
     @classmethod
     def of(cls, rows: Array, keep: Array) -> Self:
-        """Of outlines (m, W) at height 0, and distances from their cores, (m,), m."""
-        round_ones = rows[:, COUNT] == 1.0
-        c, r = _outermost(rows[round_ones, CORNERS : CORNERS + 2] @ np.array((1.0, 1.0j)), keep[round_ones])
-        return cls(c, r, rows[~round_ones], np.maximum(keep[~round_ones], 2.0 * TOL))
+        """Of outlines (m, W) at height 0, and distances from their cores, (m,), m: no points, no discs inside discs."""
+        is_disc = rows[:, COUNT] == 1.0
+        discs = np.flatnonzero(is_disc & (keep > TOL))
+        discs = discs[_are_outermost(_middles(rows[discs]), keep[discs])]
+        order = np.concatenate((discs, np.flatnonzero(~is_disc)))
+        return cls(rows[order], np.where(is_disc, keep, np.maximum(keep, 2.0 * TOL))[order])
 
-    @property
-    def middles(self) -> Array:
-        """The middles of discs and polygons, (m + k, 2), m."""
-        return np.concatenate((_places(self.c), self.rows[:, MIDDLE : MIDDLE + 2]))
+    @cached_property
+    def first(self) -> int:
+        """Index of the first wall or polygon."""
+        return int((self.rows[:, COUNT] == 1.0).sum())
 
     @cached_property
     def cells(self) -> Indices:
-        """The square cell that has the middle of each disc and polygon, as wide as the longest distance to keep."""
-        size = max(self.r.max(initial=0.0), self.keep.max(initial=0.0))
-        return np.unique(np.floor(self.middles / size), axis=0, return_inverse=True)[1].ravel()
+        """The square cell that has the middle of each, as wide as the longest distance to keep."""
+        middles = self.rows[:, MIDDLE:EXTENT] / self.keep.max(initial=0.0)
+        return np.unique(np.floor(middles), axis=0, return_inverse=True)[1].ravel()
 
     @property
     def corners(self) -> tuple[Points, Points, Points]:
         """All corners, (n,), polygon by polygon, and the corners before and after each."""
-        count, width = self.rows[:, COUNT, None].astype(np.intp), int(self.rows[:, COUNT].max(initial=0.0))
-        places = self.rows[:, CORNERS : CORNERS + 2 * width].reshape(len(self.rows), width, 2) @ np.array((1.0, 1.0j))
+        rows = self.rows[self.first :]
+        count, width = rows[:, COUNT, None].astype(np.intp), int(rows[:, COUNT].max(initial=0.0))
+        places = rows[:, CORNERS : CORNERS + 2 * width].reshape(len(rows), width, 2) @ np.array((1.0, 1.0j))
         at = np.arange(width)
         there = at < count
         before, after = (np.take_along_axis(places, (at + turn) % count, axis=1) for turn in (-1, 1))
@@ -193,30 +194,25 @@ class _Obstacles:
     @property
     def edges(self) -> tuple[Points, Points]:
         """First and last points of the straight parts of the boundaries, (n,)."""
-        if not len(self.rows):
-            return np.empty(0, dtype=complex), np.empty(0, dtype=complex)
         here, _, after = self.corners
-        out = -1j * (after - here) / abs(after - here) * self.of_corners(self.keep)
+        out = -1j * (after - here) / abs(after - here) * self.of_corners
         return here + out, after + out
 
-    def of_corners(self, values: Array) -> Array:
-        """Values of polygons, (k,), for each of their corners, (n,)."""
-        return np.repeat(values, self.rows[:, COUNT].astype(np.intp))
+    @property
+    def of_corners(self) -> Array:
+        """Distances to keep from the polygons of all corners, (n,), m."""
+        return np.repeat(self.keep[self.first :], self.rows[self.first :, COUNT].astype(np.intp))
 
     @cached_property
     def circles(self) -> tuple[Points, Array, Points]:
         """Centres and radii of discs and of circles round corners, (n,), and the ways to the next corners, (2, n)."""
-        discs = np.zeros((2, len(self.c)), dtype=complex)
-        if not len(self.rows):
-            return self.c, self.r, discs
         here, before, after = self.corners
-        r = self.of_corners(self.keep)
-        kept = _are_outermost(here, r)
+        kept = _are_outermost(here, self.of_corners)
         ways = np.stack((before - here, after - here))[:, kept]
         return (
-            np.concatenate((self.c, here[kept])),
-            np.concatenate((self.r, r[kept])),
-            np.concatenate((discs, ways), axis=1),
+            np.concatenate((_middles(self.rows[: self.first]), here[kept])),
+            np.concatenate((self.keep[: self.first], self.of_corners[kept])),
+            np.concatenate((np.zeros((2, self.first)), ways), axis=1),
         )
 
     @cached_property
@@ -229,60 +225,51 @@ class _Obstacles:
         begin = np.where(of_corner, np.angle(1j * before) - SLACK, 0.0)
         sweep = np.where(of_corner, np.angle(-after / np.where(of_corner, before, 1.0)) % (2.0 * np.pi), 2.0 * np.pi)
         sweep = np.minimum(sweep + 2.0 * SLACK, 2.0 * np.pi)
-        discs = outline.balls(np.column_stack([_places(self.c), np.zeros(len(self.c))]))
-        rows, reach = outline.joined(discs, self.rows), np.concatenate((self.r, self.keep)) - 2.0 * TOL
-        return ~convex.arcs_are_covered(_places(c), r, begin, sweep, rows, reach)
+        return ~convex.arcs_are_covered(_places(c), r, begin, sweep, self.rows, self.keep - 2.0 * TOL)
 
     def lack(self, point: complex) -> str | None:
         """Words for the first obstacle that a point is nearer to than allowed, by more than TOL; or None."""
-        inside = abs(self.c - point) < self.r - TOL
-        if inside.any():
-            return f"the disc at {_show(self.c[inside][0])}, radius {self.r[inside][0]}"
-        near = self.distances(point) < self.keep - TOL
-        if near.any():
-            middle = complex(*self.rows[near][0, outline.MIDDLE : outline.EXTENT])
-            return f"the obstacle about {_show(middle)}, with {self.keep[near][0]} m round it"
-        return None
+        inside = np.flatnonzero(self.distances(point) < self.keep - TOL)
+        if not len(inside):
+            return None
+        k = int(inside[0])
+        middle, keep = _show(complex(*self.rows[k, MIDDLE:EXTENT])), self.keep[k]
+        is_disc = k < self.first
+        return (
+            f"the disc at {middle}, radius {keep}"
+            if is_disc
+            else f"the obstacle about {middle}, with {keep} m round it"
+        )
 
     def distances(self, point: complex) -> Array:
-        """Signed distances of a point from the cores of walls and polygons, (k,), m."""
-        return convex.distances(self.rows, np.array((point.real, point.imag, 0.0)), True)
+        """Signed distances of a point from the cores, (m,), m."""
+        apart = convex.distances(self.rows, np.array((point.real, point.imag, 0.0)), True)
+        apart[: self.first] = abs(_middles(self.rows[: self.first]) - point)
+        return apart
 
     def shrunk(self, point: complex) -> Self:
         """These obstacles, but with a point that is up to TOL inside on the boundary."""
-        far, farther = abs(self.c - point), self.distances(point)
-        if (self.r <= far).all() and (self.keep <= farther).all():
-            return self  # with what is known of its circles
-        return replace(self, r=np.minimum(self.r, far), keep=np.minimum(self.keep, farther))
+        far = self.distances(point)
+        return self if (self.keep <= far).all() else replace(self, keep=np.minimum(self.keep, far))
 
     def some(self, which: Flags) -> Self:
-        """Some of discs and polygons, (m + k,)."""
-        discs, others = np.split(which, [len(self.r)])
-        return replace(self, c=self.c[discs], r=self.r[discs], rows=self.rows[others], keep=self.keep[others])
+        """Some of them, (m,)."""
+        return replace(self, rows=self.rows[which], keep=self.keep[which])
 
     def clear(self, points: Points) -> Flags:
         """Which points, (n,), are outside everything; (n,)."""
-        free = _clear(points[:, None], self.c, self.r)
-        if len(self.rows):
-            free &= convex.points_are_free(_places(points), self.rows, self.keep - _EPS)
-        return free
+        return convex.points_are_free(_places(points), self.rows, self.keep - _EPS)
 
     def passable(self, a: Points, b: Points) -> Flags:
         """Which segments, from (n,) to (n,), nothing blocks; (n,)."""
-        free = _passable(a, b, self.c, self.r)
-        if len(self.rows):
-            left = np.flatnonzero(free)
-            free[left] = convex.ways_are_clear(_places(a[left]), _places(b[left]), self.rows, self.keep - _EPS)
-        return free
+        return convex.ways_are_clear(_places(a), _places(b), self.rows, self.keep - _EPS)
 
     def entered(self, pieces: Array) -> Flags:
-        """Which discs and polygons pieces of a path (see ``Path``) run into, or nearly; (m + k,)."""
-        discs = _entered(pieces, self.c, self.r)
-        if not len(self.rows):
-            return discs
+        """Which of them pieces of a path (see ``Path``) run into, polygons also nearly; (m,)."""
+        discs = _entered(pieces, _middles(self.rows[: self.first]), self.keep[: self.first])
         begin, end, sagitta = _chords(pieces)
-        others = convex.in_the_way(_places(begin), _places(end), sagitta, self.rows, self.keep - _EPS)
-        return np.concatenate((discs, others))
+        rows, keep = self.rows[self.first :], self.keep[self.first :]
+        return np.concatenate((discs, convex.in_the_way(_places(begin), _places(end), sagitta, rows, keep - _EPS)))
 
 
 def _flat(rows: Array) -> Array:
@@ -290,6 +277,10 @@ def _flat(rows: Array) -> Array:
     flat_rows = rows.copy()
     flat_rows[:, BASE] = flat_rows[:, TOP] = 0.0
     return flat_rows
+
+
+def _middles(rows: Array) -> Points:
+    return rows[:, MIDDLE:EXTENT] @ np.array((1.0, 1.0j))
 
 
 def _places(points: Points) -> Array:
@@ -314,13 +305,6 @@ def _show(z: complex) -> str:
     return f"({z.real:.6g}, {z.imag:.6g})"
 
 
-def _outermost(c: Points, r: Array) -> tuple[Points, Array]:
-    """Drop points, and the discs that are inside another one; of equal discs keep the first."""
-    c, r = c[r > TOL], r[r > TOL]
-    keep = _are_outermost(c, r)
-    return c[keep], r[keep]
-
-
 def _are_outermost(c: Points, r: Array) -> Flags:
     """Which discs are not inside another one, of equal discs the first; (m,)."""
     if not len(r):
@@ -332,21 +316,6 @@ def _are_outermost(c: Points, r: Array) -> Flags:
     keep = np.ones(len(r), dtype=bool)
     keep[i[within & (~around | (j < i))]] = False
     return keep
-
-
-def _clear(points: Points, c: Points, r: Array) -> Flags:
-    """Which points, shape (n, 1) or one per disc (n, m), are outside all discs; shape (n,)."""
-    return np.asarray((abs(points - c) >= r - _EPS).all(axis=1))
-
-
-def _passable(a: Points, b: Points, c: Points, r: Array) -> Flags:
-    """Which segments, from (n,) to (n,), no disc blocks; shape (n,)."""
-    u = (b - a) / np.maximum(abs(b - a), 1e-300)
-    free = np.ones(len(a), dtype=bool)
-    for some in np.array_split(np.arange(len(a)), len(a) * len(r) // AT_ONCE + 1):
-        along = np.clip(((c - a[some, None]) * u[some, None].conj()).real, 0.0, abs(b - a)[some, None])
-        free[some] = _clear(a[some, None] + along * u[some, None], c, r)
-    return free
 
 
 def _crossings(c: Points, r: Array) -> tuple[Points, Indices]:
@@ -381,8 +350,8 @@ def _on_edges(c: Points, r: Array, begin: Points, end: Points) -> tuple[Points, 
 
 def _escape(p: complex, around: _Obstacles) -> complex:
     """The nearest point to p, which is inside, of the boundary of the union of all obstacles."""
-    depth = np.concatenate((abs(around.c - p) - around.r, around.distances(p) - around.keep))
-    reach = 2.0 * float(max(around.r.max(initial=0.0), around.keep.max(initial=0.0)))
+    depth = around.distances(p) - around.keep
+    reach = 2.0 * float(around.keep.max(initial=0.0))
     while True:  # as far as it reaches, the obstacles that do, too, are the union
         near = depth <= reach
         free = _exit(p, around.some(near))
@@ -452,7 +421,8 @@ def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
             return route
         some, searches = some | new, searches + 1
         if searches >= SEARCHES:  # it feels its way along a wall of many parts: more of them at once, one from a cell
-            apart, _ = cKDTree(around.middles[new]).query(around.middles)
+            middles = around.rows[:, MIDDLE:EXTENT]
+            apart, _ = cKDTree(middles[new]).query(middles)
             apart[np.isin(around.cells, around.cells[some])] = np.inf
             order = np.argsort(apart, kind="stable")
             nearest = order[np.sort(np.unique(around.cells[order], return_index=True)[1])]

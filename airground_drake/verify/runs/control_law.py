@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.scenario.schema import Control
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.engines.outlines import Indices
 from airground_drake.verify.engines.shortfalls import demanded
 from airground_drake.verify.runs.pairs import contacts, is_planar, pairs_beside, parts_of
 

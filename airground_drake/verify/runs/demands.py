@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import (
     CORNERS,
     COUNT,
     EXTENT,
     MIDDLE,
-    Indices,
     unpacked,
 )
 from airground_drake.verify.runs.control_law import ON_TOP

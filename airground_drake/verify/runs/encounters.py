@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.sim.trace import Trace, per_trace
-from airground_drake.verify.engines.outlines import Cores, Indices, apart_by_blocks, away_from, least_distances
+from airground_drake.verify.engines.outlines import Cores, apart_by_blocks, away_from, least_distances
 from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
 from airground_drake.verify.runs.pairs import (
     BENT_M,

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airground_drake.base.arrays import Array, Flags
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance, part_of_gain
 from airground_drake.scenario.schema import MAP, Scenario
 from airground_drake.scenario.shapes import convex_parts
@@ -33,7 +33,6 @@ from airground_drake.verify.engines.outlines import (
     Away,
     Contacts,
     Cores,
-    Indices,
     apart_by_blocks,
     away_from,
     closest,

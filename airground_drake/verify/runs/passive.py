@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.base.arrays import Array, Flags
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.outlines import Indices, away_from
+from airground_drake.verify.engines.outlines import away_from
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, shortfalls
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, Pair, cores_of, is_planar, origin_of, pairs_of
 

@@ -240,7 +240,7 @@ def test_a_way_along_a_wall_of_many_parts_takes_few_searches(monkeypatch: pytest
     """Round one disc the next is in the way, and so on to the end of the wall."""
     discs = [(0.4 * k, 0.4 * k, 0.3) for k in range(-80, 81)]
     searches, search = list[int](), paths._route
-    monkeypatch.setattr(paths, "_route", lambda p, q, some: searches.append(len(some.r)) or search(p, q, some))
+    monkeypatch.setattr(paths, "_route", lambda p, q, some: searches.append(len(some.keep)) or search(p, q, some))
     found = find((2.0, -2.0), (-2.0, 2.0), discs)
     assert clearance(sample(found)[1], discs) >= -TOL
     assert len(searches) < 30
