@@ -1,7 +1,5 @@
 """Judging every claim that is registered: on a run, or about the model of a scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial

@@ -3,8 +3,6 @@
 SAFE-HYP compares the built controllers with the scenario.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import combinations, product

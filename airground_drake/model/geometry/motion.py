@@ -1,7 +1,5 @@
 """Timed polylines: the preset trajectory of a UGV, and the motion that an intervention asks for."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import Any, Self
@@ -50,7 +48,7 @@ class Motion:
         return self
 
     @classmethod
-    def at_speed(cls, waypoints: Array, speed: float, start: float = 0.0) -> Motion:
+    def at_speed(cls, waypoints: Array, speed: float, start: float = 0.0) -> Self:
         """Travel waypoints (M, 3) m at constant speed, m/s, from time `start`, s.
 
         Raises:

@@ -1,10 +1,8 @@
 """A map of square cells in the world: its frame, its rectangles, and what robots can reach."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +53,7 @@ class Grid(NamedTuple):
         """Row and column of the cell at each point, (n, 2) for (n, 2), m. They may be outside of the map."""
         return np.floor(self.frame.places(points))[:, ::-1].astype(np.int64)
 
-    def filled(self, robots: Sequence[Sequence[float]]) -> Grid:
+    def filled(self, robots: Sequence[Sequence[float]]) -> Self:
         """The map with all free cells occupied that no robot can reach; `robots` in m."""
         # Robots go from a cell to one that shares a side with it, and leave the map where its edge is free. If no robot
         # is at a free cell, nothing is filled.

@@ -14,6 +14,7 @@ from airground_drake.uav.coordination.roadmap import Space
 from airground_drake.uav.coordination.single import Mover, OtherRobot, Way, find
 from airground_drake.uav.coordination.timed import distance, straightened
 
+ROUNDS = 2  # how often every way is straightened among the others
 GAIN_S = 1e-3  # a change must lower the sum of times by more than this, s
 DRAWN = 3  # number of drawn orders in which all robots are planned for anew
 MOST_IN_THE_WAY = 6  # largest number of robots in the way of a late one that are planned for anew with it
@@ -96,9 +97,6 @@ class Refinement:
 
     def _body(self, i: int, way: Way) -> OtherRobot:
         return OtherRobot(way.motion, self._movers[i].task.body)
-
-
-ROUNDS = 2  # how often every way is straightened among the others
 
 
 def smooth(

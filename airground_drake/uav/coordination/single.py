@@ -1,11 +1,9 @@
 """Plan one robot's way among robots with fixed motions: a safe-interval search to its preset, then along it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -57,7 +55,7 @@ class Mover:
     blocked: dict[tuple[int, float], tuple[Indices, Array, Array]] = field(default_factory=dict)
 
     @classmethod
-    def on(cls, roadmap: Roadmap, space: Space, task: RobotTask, speed: float, own: RobotNodes) -> Mover:
+    def on(cls, roadmap: Roadmap, space: Space, task: RobotTask, speed: float, own: RobotNodes) -> Self:
         """Put a robot with a speed, m/s, on a roadmap."""
         places = roadmap.nodes[own.preset]
         clear = own.usable[:-1] & own.usable[1:] & space.segments_are_free(places[:-1], places[1:])

@@ -34,148 +34,6 @@ from airground_drake.verify.runs.gate_record import (
 )
 from airground_drake.verify.runs.pairs import are_too_near
 
-WIDE = 1e-5  # relative width of an enclosure above which a better omega* is looked for
-
-
-@dataclass(frozen=True)
-class Enclosure:
-    """Bounds of the optimum of a decision's problem, and a lower bound for plans with the other first stage."""
-
-    lower: float
-    upper: float
-    other_first: float
-
-    def __and__(self, other: Enclosure) -> Enclosure:
-        """The better of each bound."""
-        lower, upper = max(self.lower, other.lower), min(self.upper, other.upper)
-        return Enclosure(lower, upper, max(self.other_first, other.other_first))
-
-
-def enclose(rows: Sequence[DecisionRecord]) -> list[Enclosure]:
-    """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the half-planes' normals."""
-    # For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
-    # q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b) with q convex and quadratic. The tangent of q at any omega* is below q
-    # everywhere, and its minimum is at a corner of the box. Both l and omega* are the solver's; neither need be good.
-    # Where costs are tiny, the solver's omega* is not accurate enough, and the minimiser of q is used, too.
-    if not rows:
-        return []
-    enclosures = []
-    for row, omega, solved in zip(rows, *_solve(rows), strict=True):
-        multiplier = solved * row.scale if row.slack_weight > 0.0 else 0.0 * solved
-        bounds = _bounds(row, omega, multiplier)
-        if bounds.upper - bounds.lower > WIDE * row.scale:
-            bounds &= _bounds(row, _minimiser(row, multiplier), multiplier)
-        enclosures.append(bounds)
-    return enclosures
-
-
-def _bounds(row: DecisionRecord, omega: Array, multiplier: Array) -> Enclosure:
-    """The bounds of `enclose` for a plan (N,) and multipliers (N, m), 1/m."""
-    dt, slack, normals = row.dt, row.slack_weight, row.half_planes
-    error = row.error_weight * row.lasting[:, None]
-    positions = row.positions(omega)
-    away = positions - row["reference_m"]
-    value = (error * np.square(away)).sum() - (multiplier * row.gaps(positions, normals)).sum()
-    value -= np.square(multiplier.sum(axis=1)).sum() / (4.0 * dt * slack) if slack > 0.0 else 0.0
-    by_position = 2.0 * error * away - np.einsum("km,kmi->ki", multiplier, normals)
-    change = dt * (row["accept_m_s"] - row["refuse_m_s"])
-    slope = np.einsum("ki,ki->k", change, np.cumsum(by_position[::-1], axis=0)[::-1])
-    corner = np.minimum(-slope * omega, slope * (1.0 - omega))
-    other = value + corner[1:].sum() + slope[0] * (1.0 - row["plan"][0] - omega[0])
-    return Enclosure(float(value + corner.sum()), float(row.cost(positions, normals)), float(other))
-
-
-def _minimiser(row: DecisionRecord, multiplier: Array) -> Array:
-    """Minimiser of q in the box, by bounded least squares; the multipliers' forces shift the reference."""
-    n = row.stages
-    weight = row.error_weight * row.lasting[:, None]
-    force = np.einsum("km,kmi->ki", multiplier, row.half_planes)
-    aim = row["reference_m"] + force / (2.0 * weight) - row.positions(np.zeros(n))
-    change = row.dt * (row["accept_m_s"] - row["refuse_m_s"])
-    reached = np.tril(np.ones((n, n)))[:, None, :] * change.T  # (stage, axis, omega)
-    matrix = (np.sqrt(weight)[..., None] * reached).reshape(3 * n, n)
-    fitted = lsq_linear(matrix, (np.sqrt(weight) * aim).ravel(), (0.0, 1.0), method="bvls", tol=1e-14)
-    return np.clip(np.asarray(fitted.x), 0.0, 1.0)
-
-
-def _solve(rows: Sequence[DecisionRecord]) -> tuple[list[Array], list[Array]]:
-    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to each scale, of all rows as one program."""
-    # Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
-    import cvxpy  # takes a second, which other claims need not wait for
-
-    cp: Any = cvxpy  # its types are incomplete
-    stages = rows[0].stages
-    total = stages * len(rows)
-    change = np.concatenate([row.dt * (row["accept_m_s"] - row["refuse_m_s"]) for row in rows])
-    moved = [np.diff(row["reference_m"], axis=0, prepend=row["initial_m"][None]) for row in rows]
-    drift = np.concatenate([row.dt * row["refuse_m_s"] - step for row, step in zip(rows, moved, strict=True)])
-    follows = np.arange(3, 3 * total) // 3 % stages != 0
-    dynamics = sparse.eye(3 * total) - sparse.diags(follows.astype(float), -3)
-    steering = sparse.bsr_matrix((change[:, :, None], np.arange(total), np.arange(total + 1))).tocsr()
-    points = [len(row["distances_m"]) for row in rows]
-    at = np.repeat(np.arange(total), np.repeat(points, stages))  # inequality by inequality, its stage
-    count = len(at)
-    normals = np.concatenate([row.half_planes.reshape(-1, 1, 3) for row in rows])
-    facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
-    picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
-    least = np.concatenate([-row.gaps(row["reference_m"], row.half_planes).ravel() for row in rows])
-    of_error = np.sqrt(np.concatenate([row.error_weight * row.lasting / row.scale for row in rows]))
-    of_slack = np.sqrt([row.dt * row.slack_weight / row.scale for row in rows])
-    e = cp.Variable(3 * total)
-    omega = cp.Variable(total)
-    u = cp.Variable(total)
-    constraints = [dynamics @ e - steering @ omega == drift.ravel(), omega >= 0.0, omega <= 1.0, u >= 0.0]
-    constraints += [facing @ e + picks @ u >= least] if count else []
-    error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3), e))
-    slack = cp.sum_squares(cp.multiply(np.repeat(of_slack, stages), u))
-    cp.Problem(cp.Minimize(error + slack), constraints).solve(solver=cp.CLARABEL)
-    if omega.value is None:
-        raise TraceError("the independent solver gave no solution")
-    shares = [np.clip(part, 0.0, 1.0) for part in np.split(omega.value, len(rows))]
-    dual = np.maximum(0.0, constraints[-1].dual_value) if count else np.empty(0)
-    parts = np.split(dual, np.cumsum(stages * np.array(points))[:-1])
-    return shares, [part.reshape(stages, m) for part, m in zip(parts, points, strict=True)]
-
-
-TIE = 1e-9  # accumulated deficits closer to 1/2 than this are a tie: either mode may follow
-ROUNDED_ROUTES = ("relaxed", "nonlinear")  # routes that solve (27) and round by (28)-(29)
-
-
-def is_rounded(row: DecisionRecord) -> bool:
-    """Whether a relaxed plan or a rounded one was recorded; each needs the other."""
-    rounded = row.data["relaxed"] is not None or row.data["rounded"] is not None
-    if not rounded and row.given["route"] in ROUNDED_ROUTES and row.given["status"] == "optimal":
-        raise TraceError(f"{row.label} claims to be complete, but has no relaxation")
-    return rounded
-
-
-def integrated_error_s(row: DecisionRecord) -> float:
-    """Largest integrated difference of the relaxed and the rounded plan, s."""
-    return float(row.dt * np.abs(np.cumsum(row["relaxed"] - row["rounded"])).max())
-
-
-def compare_rounding(row: DecisionRecord) -> Iterator[Deviation]:
-    """Compare the rounded plan with the rule (28)-(29), and the recorded numbers with the plans."""
-    # Each stage is judged by the deficit that the recorded stages before it leave, so that one wrong stage does not
-    # blur the next. The integrated error is judged against its own bound as well, so that the verdict does not rest on
-    # the theorem that follows from the rule.
-    relaxed = row["relaxed"]
-    rounded = row["rounded"]
-    given = row.given
-    yield Deviation(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)
-    yield Deviation(row, "rounded omega is not binary", np.minimum(np.abs(rounded), np.abs(rounded - 1.0)), 0.0)
-    deficit = np.cumsum(relaxed) - np.concatenate([[0.0], np.cumsum(rounded)[:-1]])
-    against = np.where(rounded == 1.0, 0.5 - deficit, deficit - 0.5)  # positive: the other mode lacks more
-    yield Deviation(row, "rounded against the rule", np.maximum(0.0, against), TIE, stage=int(np.argmax(against)))
-    error = integrated_error_s(row)
-    beyond = max(0.0, error - row.dt / 2.0)
-    yield Deviation(row, "integrated rounding error beyond half a stage, s", beyond, TIE * row.dt, error_s=error)
-    yield Deviation(row, "recorded rounding error, s", given["rounding_deviation_s"] - error, TIE, recomputed_s=error)
-    yield Deviation(row, "recorded relaxed first stage", given["relaxed_first_stage"] - relaxed[0], TIE)
-    first = "accept" if rounded[0] == 1.0 else "refuse"
-    yield Deviation(row, "recorded rounded first stage", float(given["rounded_first_stage"] != first), 0.0)
-
-
 SPEED_TOLERANCE = 1e-4  # a step may be longer than the speed limit allows by this, relative
 # Closer than the safe distance by more than this, m, the avoidance inequalities may ask for more speed than that: they
 # ask for less than 1e-5 m/s per point before, at gains up to 10 1/s.
@@ -186,6 +44,9 @@ WIDEST = 1e-5
 BLOCKS = 10  # all plans of at most so many choices are evaluated by exact distances, too
 # All plans of so many blocks can be evaluated along half-planes; they enclose the optimum of the route's problem.
 MOST_BLOCKS = 12
+TIE = 1e-9  # accumulated deficits closer to 1/2 than this are a tie: either mode may follow
+ROUNDED_ROUTES = ("relaxed", "nonlinear")  # routes that solve (27) and round by (28)-(29)
+WIDE = 1e-5  # relative width of an enclosure above which a better omega* is looked for
 NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (26)"
 
 
@@ -453,3 +314,138 @@ def plans_of_blocks(stages: int, blocks: int) -> Array:
     blocks = min(blocks, stages)
     modes = (np.arange(2**blocks)[:, None] >> np.arange(blocks)) % 2
     return modes[:, np.arange(stages) * blocks // stages].astype(np.float64)
+
+
+def is_rounded(row: DecisionRecord) -> bool:
+    """Whether a relaxed plan or a rounded one was recorded; each needs the other."""
+    rounded = row.data["relaxed"] is not None or row.data["rounded"] is not None
+    if not rounded and row.given["route"] in ROUNDED_ROUTES and row.given["status"] == "optimal":
+        raise TraceError(f"{row.label} claims to be complete, but has no relaxation")
+    return rounded
+
+
+def integrated_error_s(row: DecisionRecord) -> float:
+    """Largest integrated difference of the relaxed and the rounded plan, s."""
+    return float(row.dt * np.abs(np.cumsum(row["relaxed"] - row["rounded"])).max())
+
+
+def compare_rounding(row: DecisionRecord) -> Iterator[Deviation]:
+    """Compare the rounded plan with the rule (28)-(29), and the recorded numbers with the plans."""
+    # Each stage is judged by the deficit that the recorded stages before it leave, so that one wrong stage does not
+    # blur the next. The integrated error is judged against its own bound as well, so that the verdict does not rest on
+    # the theorem that follows from the rule.
+    relaxed = row["relaxed"]
+    rounded = row["rounded"]
+    given = row.given
+    yield Deviation(row, "relaxed omega is outside [0, 1]", np.maximum(0.0, np.abs(relaxed - 0.5) - 0.5), 0.0)
+    yield Deviation(row, "rounded omega is not binary", np.minimum(np.abs(rounded), np.abs(rounded - 1.0)), 0.0)
+    deficit = np.cumsum(relaxed) - np.concatenate([[0.0], np.cumsum(rounded)[:-1]])
+    against = np.where(rounded == 1.0, 0.5 - deficit, deficit - 0.5)  # positive: the other mode lacks more
+    yield Deviation(row, "rounded against the rule", np.maximum(0.0, against), TIE, stage=int(np.argmax(against)))
+    error = integrated_error_s(row)
+    beyond = max(0.0, error - row.dt / 2.0)
+    yield Deviation(row, "integrated rounding error beyond half a stage, s", beyond, TIE * row.dt, error_s=error)
+    yield Deviation(row, "recorded rounding error, s", given["rounding_deviation_s"] - error, TIE, recomputed_s=error)
+    yield Deviation(row, "recorded relaxed first stage", given["relaxed_first_stage"] - relaxed[0], TIE)
+    first = "accept" if rounded[0] == 1.0 else "refuse"
+    yield Deviation(row, "recorded rounded first stage", float(given["rounded_first_stage"] != first), 0.0)
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """Bounds of the optimum of a decision's problem, and a lower bound for plans with the other first stage."""
+
+    lower: float
+    upper: float
+    other_first: float
+
+    def __and__(self, other: Enclosure) -> Enclosure:
+        """The better of each bound."""
+        lower, upper = max(self.lower, other.lower), min(self.upper, other.upper)
+        return Enclosure(lower, upper, max(self.other_first, other.other_first))
+
+
+def enclose(rows: Sequence[DecisionRecord]) -> list[Enclosure]:
+    """Bounds of the optimum over omega in [0, 1]^N of the cost with distances along the half-planes' normals."""
+    # For any multipliers l_kj >= 0 of u_k >= d_j - n_kj.(rho_k - o_kj), minimising the Lagrangian over u leaves
+    # q(omega) - sum_k (sum_j l_kj)^2 / (4 dt b) with q convex and quadratic. The tangent of q at any omega* is below q
+    # everywhere, and its minimum is at a corner of the box. Both l and omega* are the solver's; neither need be good.
+    # Where costs are tiny, the solver's omega* is not accurate enough, and the minimiser of q is used, too.
+    if not rows:
+        return []
+    enclosures = []
+    for row, omega, solved in zip(rows, *_solve(rows), strict=True):
+        multiplier = solved * row.scale if row.slack_weight > 0.0 else 0.0 * solved
+        bounds = _bounds(row, omega, multiplier)
+        if bounds.upper - bounds.lower > WIDE * row.scale:
+            bounds &= _bounds(row, _minimiser(row, multiplier), multiplier)
+        enclosures.append(bounds)
+    return enclosures
+
+
+def _bounds(row: DecisionRecord, omega: Array, multiplier: Array) -> Enclosure:
+    """The bounds of `enclose` for a plan (N,) and multipliers (N, m), 1/m."""
+    dt, slack, normals = row.dt, row.slack_weight, row.half_planes
+    error = row.error_weight * row.lasting[:, None]
+    positions = row.positions(omega)
+    away = positions - row["reference_m"]
+    value = (error * np.square(away)).sum() - (multiplier * row.gaps(positions, normals)).sum()
+    value -= np.square(multiplier.sum(axis=1)).sum() / (4.0 * dt * slack) if slack > 0.0 else 0.0
+    by_position = 2.0 * error * away - np.einsum("km,kmi->ki", multiplier, normals)
+    change = dt * (row["accept_m_s"] - row["refuse_m_s"])
+    slope = np.einsum("ki,ki->k", change, np.cumsum(by_position[::-1], axis=0)[::-1])
+    corner = np.minimum(-slope * omega, slope * (1.0 - omega))
+    other = value + corner[1:].sum() + slope[0] * (1.0 - row["plan"][0] - omega[0])
+    return Enclosure(float(value + corner.sum()), float(row.cost(positions, normals)), float(other))
+
+
+def _minimiser(row: DecisionRecord, multiplier: Array) -> Array:
+    """Minimiser of q in the box, by bounded least squares; the multipliers' forces shift the reference."""
+    n = row.stages
+    weight = row.error_weight * row.lasting[:, None]
+    force = np.einsum("km,kmi->ki", multiplier, row.half_planes)
+    aim = row["reference_m"] + force / (2.0 * weight) - row.positions(np.zeros(n))
+    change = row.dt * (row["accept_m_s"] - row["refuse_m_s"])
+    reached = np.tril(np.ones((n, n)))[:, None, :] * change.T  # (stage, axis, omega)
+    matrix = (np.sqrt(weight)[..., None] * reached).reshape(3 * n, n)
+    fitted = lsq_linear(matrix, (np.sqrt(weight) * aim).ravel(), (0.0, 1.0), method="bvls", tol=1e-14)
+    return np.clip(np.asarray(fitted.x), 0.0, 1.0)
+
+
+def _solve(rows: Sequence[DecisionRecord]) -> tuple[list[Array], list[Array]]:
+    """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to each scale, of all rows as one program."""
+    # Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
+    import cvxpy  # takes a second, which other claims need not wait for
+
+    cp: Any = cvxpy  # its types are incomplete
+    stages = rows[0].stages
+    total = stages * len(rows)
+    change = np.concatenate([row.dt * (row["accept_m_s"] - row["refuse_m_s"]) for row in rows])
+    moved = [np.diff(row["reference_m"], axis=0, prepend=row["initial_m"][None]) for row in rows]
+    drift = np.concatenate([row.dt * row["refuse_m_s"] - step for row, step in zip(rows, moved, strict=True)])
+    follows = np.arange(3, 3 * total) // 3 % stages != 0
+    dynamics = sparse.eye(3 * total) - sparse.diags(follows.astype(float), -3)
+    steering = sparse.bsr_matrix((change[:, :, None], np.arange(total), np.arange(total + 1))).tocsr()
+    points = [len(row["distances_m"]) for row in rows]
+    at = np.repeat(np.arange(total), np.repeat(points, stages))  # inequality by inequality, its stage
+    count = len(at)
+    normals = np.concatenate([row.half_planes.reshape(-1, 1, 3) for row in rows])
+    facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
+    picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
+    least = np.concatenate([-row.gaps(row["reference_m"], row.half_planes).ravel() for row in rows])
+    of_error = np.sqrt(np.concatenate([row.error_weight * row.lasting / row.scale for row in rows]))
+    of_slack = np.sqrt([row.dt * row.slack_weight / row.scale for row in rows])
+    e = cp.Variable(3 * total)
+    omega = cp.Variable(total)
+    u = cp.Variable(total)
+    constraints = [dynamics @ e - steering @ omega == drift.ravel(), omega >= 0.0, omega <= 1.0, u >= 0.0]
+    constraints += [facing @ e + picks @ u >= least] if count else []
+    error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3), e))
+    slack = cp.sum_squares(cp.multiply(np.repeat(of_slack, stages), u))
+    cp.Problem(cp.Minimize(error + slack), constraints).solve(solver=cp.CLARABEL)
+    if omega.value is None:
+        raise TraceError("the independent solver gave no solution")
+    shares = [np.clip(part, 0.0, 1.0) for part in np.split(omega.value, len(rows))]
+    dual = np.maximum(0.0, constraints[-1].dual_value) if count else np.empty(0)
+    parts = np.split(dual, np.cumsum(stages * np.array(points))[:-1])
+    return shares, [part.reshape(stages, m) for part, m in zip(parts, points, strict=True)]

@@ -26,6 +26,9 @@ from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Evidence, Finding
 from airground_drake.verify.model.levels import NUMBERS
 
+LEVEL = 0.99
+ERROR_ALLOWANCE = 2e-4  # bias of the corrected error rate
+TIME_ALLOWANCE = 0.05  # bias of the corrected time, in noise periods
 SEED = 20061
 MOST_PERIODS = 1_000_000  # most noise periods of a path; a few hundred are needed with the drifts in use
 # -zeta(1/2)/sqrt(2 pi): mean overshoot of a sampled Wiener path beyond a far barrier, in steps of one deviation.
@@ -113,10 +116,6 @@ def simulate(experiment: PassageExperiment) -> PassageSample:
             return PassageSample(experiment, wrong, total, squares)
     raise ArithmeticError(f"{experiment.name}: {len(x)} paths are undecided after {MOST_PERIODS} noise periods")
 
-
-LEVEL = 0.99
-ERROR_ALLOWANCE = 2e-4  # bias of the corrected error rate
-TIME_ALLOWANCE = 0.05  # bias of the corrected time, in noise periods
 
 # Mean decision time, s, and error rate that are to be compared with the simulation.
 Formulas = Callable[[PassageExperiment], tuple[float, float]]

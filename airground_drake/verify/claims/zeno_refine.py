@@ -41,6 +41,13 @@ from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Chart, Evidence, Finding
 from airground_drake.verify.model.levels import levels_of, trigger_of
 
+LEVEL = 0.99
+RESAMPLES = 4000
+DIVERGES_BELOW = -0.25
+FLAT_WITHIN = 0.1
+STANDARD_ERRORS = 5.0
+FEWEST = 0.05  # smaller mean counts are drawn as this one: the axis is logarithmic
+ROUNDING = 1e-9  # exponents are equal within this: the fit to equal counts gives about 1e-15
 SEED = 5
 PATHS = 96
 SERIES = ("bare", "automaton", "automaton_at_scenario_noise")
@@ -154,15 +161,6 @@ def counts(setting: Refinement) -> dict[str, Array]:
             for name, noise in zip(SERIES[1:], (setting.noise_m_sqrt_s, setting.own_noise_m_sqrt_s), strict=True):
                 triggered[name][i, j] = len(triggers(trigger, trigger.zeta + noise * unit, dt))
     return triggered
-
-
-LEVEL = 0.99
-RESAMPLES = 4000
-DIVERGES_BELOW = -0.25
-FLAT_WITHIN = 0.1
-STANDARD_ERRORS = 5.0
-FEWEST = 0.05  # smaller mean counts are drawn as this one: the axis is logarithmic
-ROUNDING = 1e-9  # exponents are equal within this: the fit to equal counts gives about 1e-15
 
 
 @dataclass(frozen=True)

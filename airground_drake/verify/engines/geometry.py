@@ -6,10 +6,8 @@ Times are in s, positions in m in one common frame; T is the number of rows. Row
 position[k-1] at t[k-1] to position[k] at t[k].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.optimize import brentq
@@ -66,7 +64,7 @@ class NormSignal:
     x: Array  # value at the knots, (K,), m
 
     @classmethod
-    def of(cls, t: Array, parts: Array) -> NormSignal:
+    def of(cls, t: Array, parts: Array) -> Self:
         """From times (T,) and parts (T, 4) whose x is convex between rows: its minima become knots too."""
         knots = np.union1d(t, _minima(t, parts))
         refined = interpolate(t, parts, knots)

@@ -1,12 +1,10 @@
 """A claim about the model that is a theorem: Coq checked it once, and its hypotheses are checked for each scenario."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, Self
 
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.finding import Evidence, Finding
@@ -24,7 +22,7 @@ class Hypothesis(Evidence):
     holds: bool
 
     @classmethod
-    def of(cls, name: str, says: str, margin: Fraction, unit: str = "", *, strict: bool = False) -> Hypothesis:
+    def of(cls, name: str, says: str, margin: Fraction, unit: str = "", *, strict: bool = False) -> Self:
         """Decide it by its exact margin; if `strict`, a margin of 0 fails."""
         return cls(name, says, float(margin), unit, margin > 0 if strict else margin >= 0)
 

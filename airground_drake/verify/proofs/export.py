@@ -31,6 +31,9 @@ from airground_drake.verify.proofs.coq import without_comments
 from airground_drake.verify.proofs.record import FOLDER
 from airground_drake.verify.proofs.separating import Prism, Vector, root_up, separating
 
+# A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
+# bound of an arc that is not attained, by far more.
+ROUNDED_M = Fraction(1, 2**45)
 # Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser.
 PARTS = 2**60
 
@@ -441,11 +444,6 @@ def real(number: Fraction) -> str:
 def ratio(number: Fraction) -> str:
     """Two arguments, numerator and denominator."""
     return f"{number.numerator}%Z {number.denominator}%Z"
-
-
-# A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
-# bound of an arc that is not attained, by far more.
-ROUNDED_M = Fraction(1, 2**45)
 
 
 def _bounds(trace: Trace, robot: str) -> Bounds:

@@ -20,6 +20,8 @@ from airground_drake.base.arrays import Array
 from airground_drake.verify.proofs.export import Demand, Recorded, all_of, data, offs, ratio, real, stride
 from airground_drake.verify.proofs.separating import Prism, Vector, apart, dot
 
+SCREEN_M = 1e-6  # largest error of floating-point distances, m; steps that come near by less are computed exactly
+
 
 class Entry(NamedTuple):
     """A pair, and the periods in which it obeyed the law."""
@@ -150,9 +152,6 @@ def _term(run: Recorded, entry: Entry) -> str:
     law, kept = real(entry.demand.safe_m), real(min(entry.demand.body_m, entry.demand.safe_m - off))
     pair = f"(Together (b {first}) (b {second}) points (Numbers {real(run.gain)} {law} 0 0 0) {kept})"
     return f"Entry {entry.first} {entry.many} {pair}"
-
-
-SCREEN_M = 1e-6  # largest error of floating-point distances, m; steps that come near by less are computed exactly
 
 
 @dataclass(frozen=True)

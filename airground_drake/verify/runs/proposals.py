@@ -14,6 +14,9 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import unpacked
 from airground_drake.verify.finding import Finding
 
+METHOD = "d"  # only this method has tries and rests, and predicts where an accepted intervention leads
+GATED_METHODS = ("c", "d")  # methods with an optimising gatekeeper
+
 
 @dataclass(frozen=True, eq=False)
 class ProposalRecord:
@@ -88,9 +91,6 @@ def proposal_of(trace: Trace, number: int) -> ProposalRecord:
     return proposal
 
 
-METHOD = "d"  # only this method has tries and rests, and predicts where an accepted intervention leads
-
-
 class Acceptance(NamedTuple):
     """An accepted proposal, from its acceptance until the UGV gives it back, it is withdrawn, or the run ends."""
 
@@ -131,9 +131,6 @@ def _of_ugv(trace: Trace, ugv: str) -> list[Acceptance]:
             news_s = tuple(t for t, new in [*rows[1:], *last] if new)
             accepted.append(Acceptance(on, rows[0][0], end_s, until_s, back, news_s))
     return accepted
-
-
-GATED_METHODS = ("c", "d")  # methods with an optimising gatekeeper
 
 
 def row_at(trace: Trace, t_s: float) -> int:
