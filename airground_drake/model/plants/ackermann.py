@@ -69,7 +69,6 @@ class Ackermann(Unicycle):
         return True  # behind every motion that turns at once
 
     def premises(self, run: Recorded) -> Iterator[Premise]:
-        """Its front wheels turn no farther than they can, either."""
         yield from super().premises(run)
         t, _, rate, speed = self.driven(run)
         yield Premise("least turning radius", "m/s", t, speed - self.radius_m * np.asarray(rate))

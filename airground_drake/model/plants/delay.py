@@ -24,14 +24,12 @@ class DelayKeys(Keys):
     """A whole number of control periods."""
 
     def precedes(self, other: Keys) -> bool:
-        """A plant that may be late."""
         return other.may_be_late
 
     def made(self, period_s: float, after: Plant | None) -> "Delay":
         return Delay(round(self.delay_s / period_s), period_s, after or FirstOrder())
 
     def problems(self, setting: Setting) -> Iterator[tuple[str, object, str]]:
-        """The delay is a multiple of the control period."""
         if not is_multiple(self.delay_s, setting.period_s):
             allowed = f"a whole multiple of control.period_s = {setting.period_s:.9g} s, more than 0"
             yield "delay_s", self.delay_s, allowed
@@ -53,19 +51,16 @@ class Delay(Plant):
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Those of `after`, or the place."""
         return self.after.signals or PLACE
 
     @property
     def theorems(self) -> tuple[str, ...]:
-        """Its own, and those of `after`."""
         return ("Plants.delay", *self.after.theorems)
 
     def trails(self, speed_m_s: float) -> bool:
         return True
 
     def bounds(self, speed_m_s: float) -> Bounds:
-        """The delay, and the bounds of `after`."""
         return self.after.bounds(speed_m_s)._replace(delay_s=self.periods * self.period_s)
 
     def needs(self, speed_m_s: float) -> Iterator[Need]:

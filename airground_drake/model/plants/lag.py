@@ -48,7 +48,6 @@ class Lag(Plant):
         return np.zeros(3)
 
     def remembered(self, memory: Array, command: Array, elapsed_s: float) -> Array:
-        """The velocity, exact."""
         return command + math.exp(-elapsed_s / self.time_s) * (memory - command)
 
     def at(self, memory: Array, base: Array, command: Array, elapsed_s: float) -> Array:
@@ -76,6 +75,5 @@ class Lag(Plant):
         return np.asarray(start + shares[:, None] * (end - start + behind) - part[:, None] * behind)
 
     def premises(self, run: Recorded) -> Iterator[Premise]:
-        """The body is no faster than its commands may be."""
         spare = run.max_speed_m_s - np.linalg.norm(run.signals[:, 3:], axis=1)
         yield Premise("speed of the body", "m/s", run.t_s, spare)

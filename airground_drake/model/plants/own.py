@@ -29,7 +29,6 @@ class OwnKeys(Keys):
         return Own(self.kind, self.drift_m_s, self.cover_m, self.parameters)
 
     def problems(self, setting: Setting) -> Iterator[tuple[str, object, str]]:
-        """A drift needs a gain."""
         if self.drift_m_s and not setting.gain_1_s:
             yield "drift_m_s", self.drift_m_s, "0: without control.avoidance_gain_1_s nothing makes up for a drift"
 
@@ -60,7 +59,6 @@ class Own(Plant):
         return Bounds(cover_m=self.cover_m, drift_m_s=self.drift_m_s, speed_m_s=speed_m_s)
 
     def premises(self, run: Recorded) -> Iterator[Premise]:
-        """Drift and cover are as declared."""
         drift, cover = run.measured.T
         yield Premise("declared drift", "m/s", run.sampled_s, self.drift_m_s - drift)
         yield Premise("declared cover", "m", run.sampled_s, self.cover_m - cover)

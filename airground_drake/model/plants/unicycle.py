@@ -79,7 +79,6 @@ class Unicycle(Plant):
 
     @property
     def theorems(self) -> tuple[str, ...]:
-        """One more about a unicycle that never drives backwards."""
         chords = ("Plants.chord", "Turning.chord_turns", "Turning.shortened_chord", "Turning.shortened")
         return chords if self.backwards else (*chords, "Plants.forwards")
 
@@ -133,7 +132,6 @@ class Unicycle(Plant):
         return np.array([self.heading_rad])
 
     def remembered(self, memory: Array, command: Array, elapsed_s: float) -> Array:
-        """The heading after a turn."""
         return np.array([heading_after(float(memory[0]), command, elapsed_s, self.hand_m, self.period_s)])
 
     def at(self, memory: Array, base: Array, command: Array, elapsed_s: float) -> Array:

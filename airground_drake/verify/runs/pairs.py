@@ -415,12 +415,12 @@ def apart_of(trace: Trace) -> Array:
     return np.array([bounds_m[pair.first, pair.second] for pair in pairs_of(trace)])
 
 
+@per_trace
 def off_m_of(trace: Trace, name: str) -> float:
     """How far a body may be from the straight line between its positions at two rows, m."""
     if name not in trace.robots:
         return 0.0
-    bend = trace.plant(name).bends_m
-    return trace.derived(("off", name), lambda: float(bend(trace.t, trace.signals(name)).max(initial=0.0)))
+    return float(trace.plant(name).bends_m(trace.t, trace.signals(name)).max(initial=0.0))
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:

@@ -4,7 +4,6 @@ A robot keeps n.v >= -(D - d - V h) / h, and n.v >= 0 where D < d + V h: it is *
 of min(D, d + V h), the obstacle has moved itself.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
@@ -151,28 +150,27 @@ class BesideMoving:
 
 def beside_moving(trace: Trace) -> list[BesideMoving]:
     """Each robot beside each obstacle that may move."""
-    return trace.derived("beside moving", lambda: list(_beside_each(trace)))
-
-
-def _beside_each(trace: Trace) -> Iterator[BesideMoving]:
-    fast = speeds(trace)
+    rows, fast = list[BesideMoving](), speeds(trace)
     slop = DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
     for periods in beside(trace):
         pair = periods.pair
         speed = fast.get(pair.second, np.zeros(1))
         over = np.flatnonzero(speed > pair.speed_m_s + slop)
-        yield BesideMoving(
-            first=pair.first,
-            second=pair.second,
-            safe_distance_m=pair.required_m,
-            declared_m_s=pair.speed_m_s,
-            fastest_m_s=float(speed.max()),
-            too_fast_s=float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
-            too_fast_m_s=float(speed[over[0]]) if len(over) else None,
-            periods=len(periods.row),
-            kept_periods=int(periods.kept.sum()),
-            passive_periods=int(periods.passive.sum()),
-            retreating_periods=int(periods.retreated.sum()),
-            standing_periods=int(periods.stood.sum()),
-            e_m=float(periods.missed_m.max(initial=0.0)),
+        rows.append(
+            BesideMoving(
+                first=pair.first,
+                second=pair.second,
+                safe_distance_m=pair.required_m,
+                declared_m_s=pair.speed_m_s,
+                fastest_m_s=float(speed.max()),
+                too_fast_s=float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
+                too_fast_m_s=float(speed[over[0]]) if len(over) else None,
+                periods=len(periods.row),
+                kept_periods=int(periods.kept.sum()),
+                passive_periods=int(periods.passive.sum()),
+                retreating_periods=int(periods.retreated.sum()),
+                standing_periods=int(periods.stood.sum()),
+                e_m=float(periods.missed_m.max(initial=0.0)),
+            )
         )
+    return rows
