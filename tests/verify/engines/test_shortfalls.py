@@ -120,7 +120,7 @@ def test_the_screen_hides_nothing_beside_a_core(seed: int, planar: bool) -> None
     way = (way + np.append(core.corners[0], 0.0) + rng.normal(0.0, 1.0, 3)) * [1.0, 1.0, not planar]
     screened = shortfalls(way, np.zeros(3), D, ONE, GAIN, ONE, core, planar=planar)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_doubtful", lambda first, *_: np.arange(len(first) - 1))
+        patch.setattr(module, "_doubtful", lambda first, *_, **__: np.arange(len(first) - 1))
         assert shortfalls(way, np.zeros(3), D, ONE, GAIN, ONE, core, planar=planar).tolist() == screened.tolist()
 
 
@@ -132,7 +132,7 @@ def test_the_screen_hides_nothing(seed: int, share: Fraction) -> None:
     second = np.zeros((40, 3)) if share == 1 else np.cumsum(rng.normal(0.0, 1.0, (40, 3)) * size, axis=0)
     screened = shortfalls(first, second, D, share, GAIN, ONE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_doubtful", lambda first, *_: np.arange(len(first) - 1))
+        patch.setattr(module, "_doubtful", lambda first, *_, **__: np.arange(len(first) - 1))
         assert shortfalls(first, second, D, share, GAIN, ONE).tolist() == screened.tolist()
 
 
