@@ -10,13 +10,11 @@ import hashlib
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 import pytest
 from check.forgeries import (
@@ -41,6 +39,7 @@ from check.forging import (
     forged,
     judged,
     read_table,
+    remembered,
     trace,
     write,
     write_table,
@@ -51,7 +50,7 @@ from airground_drake.check import command as checker
 from airground_drake.check.line import AGREES, RECORDED
 from airground_drake.report import junit, proved, rebuild, simulated
 from airground_drake.report.__main__ import main as write_report
-from airground_drake.report.figures.draw import draw
+from airground_drake.report.figures import draw as drawing
 from airground_drake.report.model import of
 from airground_drake.report.page import page
 from airground_drake.scenario.load import from_data
@@ -90,7 +89,7 @@ def made_again(*edits: Edit) -> Edit:
             document |= rebuild.document_again(document, scenario, traces, judged)
             made = of(document)
             write(folder / "junit.xml", junit.render(made).encode())
-            text = page(made, draw(scenario, traces), (folder / "diagram.svg").read_text(encoding="utf-8"))
+            text = page(made, drawing.draw(scenario, traces), (folder / "diagram.svg").read_text(encoding="utf-8"))
             write(folder / "report.html", text.encode())
 
     return edit
@@ -293,24 +292,11 @@ def refused_by(folder: Path, programs: Sequence[str] = PROGRAMS) -> dict[str, st
     return found
 
 
-_SIMULATED: dict[str, Any] = {}
-
-
 def remembering(patch: pytest.MonkeyPatch) -> None:
     """Simulate each scenario once: most forgeries leave it as it is."""
-
-    def once(simulate: Callable[..., Any]) -> Callable[..., Any]:
-        def remembered(scenario: Any, *arguments: Any, **_: Any) -> Any:
-            seeds = [each for each in arguments if isinstance(each, int)]
-            key = joblib.hash((asdict(scenario), seeds, simulate.__name__))
-            if key not in _SIMULATED:
-                _SIMULATED[key] = simulate(scenario, *arguments)
-            return _SIMULATED[key]
-
-        return remembered
-
-    for name in ("simulate_all", "with_seeds"):
-        patch.setattr(simulated, name, once(getattr(simulated, name)))
+    with_seeds = remembered(simulated.with_seeds)
+    patch.setattr(simulated, "simulate_all", remembered(simulated.simulate_all))
+    patch.setattr(simulated, "with_seeds", lambda scenario, made, seeds, _: with_seeds(scenario, made, seeds))
 
 
 def main(folder: Path) -> None:

@@ -5,19 +5,23 @@ import hashlib
 import io
 import json
 import os
+import pickle
 import shutil
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import joblib
 import pandas as pd
 import pytest
 
 from airground_drake.base.errors import AirgroundError
 from airground_drake.check import command as checker
+from airground_drake.check import report as checks
 from airground_drake.check.line import AGREES, RECORDED, CheckLine
-from airground_drake.report import rebuild
+from airground_drake.check.run import Run
+from airground_drake.report import document, rebuild
+from airground_drake.report.figures import draw as drawing
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import Verdict, judge_all, judging
@@ -155,18 +159,41 @@ def forged(report: Path, edit: Edit, *, mended: bool = True) -> Path:
     return folder
 
 
-_JUDGED: dict[str, Any] = {}
+def _parts(value: Any) -> Any:
+    """What a value is made of; what a trace or a run has cached does not count."""
+    if isinstance(value, dict):
+        return [(key, _parts(part)) for key, part in value.items()]
+    if isinstance(value, (list, tuple)):
+        return [*map(_parts, value)]
+    if isinstance(value, (Trace, Run, Scenario)):
+        return [getattr(value, field.name) for field in fields(value)]
+    return value
+
+
+def remembered(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As the function, but equal work is done once: most forgeries leave most runs as they are."""
+    made: dict[bytes, Any] = {}
+
+    def once(*given: Any, **_: Any) -> Any:
+        key = hashlib.sha256(pickle.dumps(_parts(given))).digest()
+        if key not in made:
+            made[key] = function(*given)
+        return made[key]
+
+    return once
+
+
+_done = remembered(lambda work, *given: work(*given))
+REMEMBERED = {
+    (checks, "DECIDED"): {claim: remembered(of_run) for claim, of_run in checks.DECIDED.items()},
+    (document, "_run"): remembered(document._run),
+    (drawing, "draw"): remembered(drawing.draw),
+}
+"""Parts of the checker, and of making a report again, that are patched in."""
 
 
 def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
-    """As `judge_all`, but equal work is done once: most forgeries leave most runs as they are."""
-
-    def once(piece: Any) -> Any:
-        key = joblib.hash((piece.func.__name__, piece.args))
-        if key not in _JUDGED:
-            _JUDGED[key] = piece()
-        return _JUDGED[key]
-
+    """As `judge_all`, but equal work is done once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judging, "run_parallel", lambda pieces, **_: list(map(once, pieces)))
+        patch.setattr(judging, "run_parallel", lambda pieces, **_: [_done(piece.func, *piece.args) for piece in pieces])
         return judge_all(scenario, traces)

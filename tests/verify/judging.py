@@ -1,9 +1,15 @@
 """Claims about a run, by their identifiers, on one trace."""
 
+from collections.abc import Iterable
 from typing import Any, Protocol
 
+import pytest
+
+from airground_drake.sim.batch.run import Batch, Going
 from airground_drake.sim.trace import Trace
-from airground_drake.verify import TRACE_CLAIMS, Finding
+from airground_drake.study.campaign.screening import happened, happened_in
+from airground_drake.verify import TRACE_CLAIMS, Finding, Verdict
+from airground_drake.verify.array_judges import SAME, ArrayJudges
 from airground_drake.verify.claim import ModelClaim
 
 
@@ -29,3 +35,16 @@ UNRECORDED = {
 def decided(claim: str, trace: Trace) -> Finding:
     """One claim on one trace."""
     return CLAIMS[claim].judge(trace)
+
+
+def findings_agreed(loop: Batch, made: Going, trace: Trace, verdicts: Iterable[Verdict]) -> set[str]:
+    """The claims about a run that array judges decide, all of them as these verdicts; and the same has happened."""
+    findings = ArrayJudges(loop).findings(made.log)
+    for verdict in verdicts:
+        if (finding := findings.get(verdict.claim.id)) is not None:
+            assert (finding.status, finding.unit) == (verdict.status, verdict.unit), verdict
+            assert finding.exercised == verdict.exercised, verdict
+            assert finding.margin == pytest.approx(verdict.margin, abs=SAME), verdict
+    if findings:
+        assert happened(loop, made) == pytest.approx(happened_in(trace), nan_ok=True)
+    return {*findings}

@@ -5,35 +5,26 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from verify.judging import findings_agreed
 
 from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Scenario
-from airground_drake.scenario.shipped import shipped_files
 from airground_drake.sim.batch.loop import Log
 from airground_drake.sim.batch.run import Batch, LeftToDrakeError
-from airground_drake.study.campaign.screening import happened, happened_in
 from airground_drake.study.testing.strategies import scenarios
 from airground_drake.verify import judge
-from airground_drake.verify.array_judges import SAME, SCREENED, ArrayJudges, NoScreenError
+from airground_drake.verify.array_judges import SCREENED, ArrayJudges, NoScreenError
 
 SHORT = ["duration_s=17.33", "reproduction=[]"]
 
 
 def compared(scenario: Scenario, run: str, seeds: range = range(1)) -> set[str]:
-    """The claims with findings, all of them those of the judge of traces; and the same has happened."""
+    """The claims with findings."""
     loop, screened = Batch(scenario, run), set[str]()
-    judges = ArrayJudges(loop)
     for seed in seeds:
         made = loop.made(seed)
-        findings, trace = judges.findings(made.log), made.trace()
-        for verdict in judge(trace, SCREENED):
-            if (finding := findings.get(verdict.claim.id)) is not None:
-                assert (finding.status, finding.unit) == (verdict.status, verdict.unit), verdict
-                assert finding.exercised == verdict.exercised, verdict
-                assert finding.margin == pytest.approx(verdict.margin, abs=SAME), verdict
-        if findings:
-            assert happened(loop, made) == pytest.approx(happened_in(trace), nan_ok=True)
-        screened |= findings.keys()
+        trace = made.trace()
+        screened |= findings_agreed(loop, made, trace, judge(trace, SCREENED))
     return screened
 
 
@@ -41,17 +32,6 @@ def compared(scenario: Scenario, run: str, seeds: range = range(1)) -> set[str]:
 def test_findings_are_those_of_the_judge_of_traces(run: str) -> None:
     """Proposals, a release, robots that slide along an obstacle and one that stalls are among them."""
     assert compared(load("case_a", SHORT), run, range(2)) == {*SCREENED}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(shipped_files()))
-def test_shipped_scenarios(name: str) -> None:
-    scenario = load(name)
-    for run in scenario.runs:
-        try:
-            compared(scenario, run)
-        except (LeftToDrakeError, NoScreenError):
-            continue
 
 
 @pytest.mark.slow

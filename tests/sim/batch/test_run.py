@@ -14,9 +14,8 @@ from airground_drake.model.trigger.excursion import Corners
 from airground_drake.report.difference import first_difference
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import Scenario
-from airground_drake.scenario.shipped import shipped_files
 from airground_drake.sim.batch import noise
-from airground_drake.sim.batch.run import Batch, LeftToDrakeError
+from airground_drake.sim.batch.run import Batch
 from airground_drake.sim.simulation import Recorder, simulate
 from airground_drake.study.testing.strategies import scenarios
 
@@ -44,10 +43,6 @@ ODD = {
 }
 
 
-LEFT = {"noisy_link": "a channel", "two_uavs": "several UAVs"}
-"""Shipped scenarios whose runs Drake makes, and why."""
-
-
 def test_bodies_that_are_late() -> None:
     """Lags, and a delay before one."""
     assert differences(load("lagging", ["duration_s=9.77"]), "d", range(2)) == []
@@ -58,20 +53,6 @@ def test_bodies_that_are_late() -> None:
 @pytest.mark.parametrize("run", ["a", "d"])
 def test_odd_settings(changes: list[str], run: str) -> None:
     assert differences(load("case_a", ["reproduction=[]", *changes]), run, range(2)) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted({*shipped_files()} - LEFT.keys()))
-def test_shipped_scenarios(name: str) -> None:
-    scenario = load(name)
-    for run in scenario.runs:
-        assert differences(scenario, run) == [], run
-
-
-@pytest.mark.parametrize("name", LEFT)
-def test_what_the_loop_cannot_make_is_named(name: str) -> None:
-    with pytest.raises(LeftToDrakeError, match=LEFT[name]):
-        Batch(load(name), "d")
 
 
 @pytest.mark.slow
