@@ -67,6 +67,12 @@ def make_links(channel: Channel) -> tuple[Link, Link]:
     return Link(down, channel.seed, "down"), Link(up, channel.seed, "up")
 
 
+def lost_at(scenario: Scenario) -> list[float]:
+    """When the UAV of each UGV is lost, s; infinite: never."""
+    lost = {ugv: scenario.aerial[uav].lost_at_s or np.inf for uav in scenario.aerial for ugv in scenario.in_charge(uav)}
+    return [lost[ugv] for ugv in scenario.ugvs]
+
+
 def repeats_after(scenario: Scenario) -> float:
     """After how long a message is repeated to which no answer has come, s; without a channel never."""
     if scenario.channel is None:
