@@ -85,9 +85,13 @@ def test_with_two_uavs_the_protocol_is_kept(given_: Channel, lost_at_s: float, r
         assert {verdicts[claim] for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP", "GATE-PLAN")} == {"holds"}
 
 
+LOST = ("duration_s=11.2", "uavs.south.lost_at_s=9.3")
+"""South is lost after it has repeated something, and before all answers are there."""
+
+
 def test_a_uav_that_is_lost_repeats_nothing_and_hears_nothing() -> None:
-    trace = over(Channel(0.4, loss=0.6), "two_uavs", "d", "duration_s=14", "uavs.south.lost_at_s=9.5")
-    of_south, lost_s = trace.messages[trace.messages["sender"] == "south"], 9.5
+    trace, lost_s = over(Channel(0.4, loss=0.4, seed=2), "two_uavs", "d", *LOST), 9.3
+    of_south = trace.messages[trace.messages["sender"] == "south"]
     assert of_south["attempt"].max() > 0
     assert of_south["sent_s"].max() < lost_s < of_south["received_s"].max()
     told = trace.messages[trace.messages["receiver"] == "south"]
@@ -159,7 +163,7 @@ def test_a_protocol_with_a_fault_is_noticed(name: str, monkeypatch: pytest.Monke
 
 def test_a_lost_uav_that_repeats_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(channel, "repeated", lambda *given: repeated(*given[:4]))
-    trace = over(Channel(0.4, loss=0.6), "two_uavs", "d", "duration_s=14", "uavs.south.lost_at_s=9.5")
+    trace = over(Channel(0.4, loss=0.4, seed=2), "two_uavs", "d", *LOST)
     assert {fault.what for fault in faults_of(trace)["channel"]} == {"repeated by a UAV that is lost"}
 
 
