@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
+from airground_drake.base.history import History
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.uav.channel import Delivery, Message, Transit
 from airground_drake.uav.messages import SILENT, Report, Reports
@@ -19,7 +20,7 @@ class Outbox:
     """All that UAVs have sent, and what they wait for."""
 
     taken: tuple[tuple[int, int], ...] = ()  # of each UAV, proposals and withdrawals of its planner that were posted
-    messages: tuple[Message, ...] = ()
+    messages: History[Message] = field(default_factory=History)
     waiting: Mapping[int, Message] = field(default_factory=dict)  # per UGV, the message to repeat, as last sent
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -42,7 +43,7 @@ def posted(box: Outbox, memories: Sequence[PlannerState]) -> Outbox:
         count += len(gone)
     new.sort(key=lambda message: message.sent_s)  # of one instant, a UAV's withdrawals first
     waiting = {**box.waiting, **{message.ugv: message for message in new}}
-    return Outbox(taken, box.messages + tuple(new), waiting)
+    return Outbox(taken, box.messages.plus(new), waiting)
 
 
 def repeated(box: Outbox, heard: Transit, t: float, retry_s: float, left: Collection[int] = ()) -> Outbox:
@@ -61,7 +62,7 @@ def repeated(box: Outbox, heard: Transit, t: float, retry_s: float, left: Collec
     if len(waiting) == len(box.waiting) and not again:
         return box
     return replace(
-        box, messages=box.messages + tuple(again), waiting={**waiting, **{message.ugv: message for message in again}}
+        box, messages=box.messages.plus(again), waiting={**waiting, **{message.ugv: message for message in again}}
     )
 
 

@@ -12,8 +12,10 @@ from typing import Any, Self
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State, ValueProducer
 
+from airground_drake.base.history import History
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.signals import keep
 from airground_drake.uav.channel import Link, Transit
 from airground_drake.uav.outbox import Outbox, posted, repeated
 from airground_drake.uav.planner import PlannerState
@@ -25,7 +27,8 @@ class Down:
 
     box: Outbox = field(default_factory=Outbox)
     transit: Transit = field(default_factory=Transit)
-    read_s: tuple[float, ...] = ()  # when its UAV read each answer that arrived, s, in the order of arrival; NaN: never
+    # when its UAV read each answer that arrived, s, in the order of arrival; NaN: never
+    read_s: History[float] = field(default_factory=History)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -80,18 +83,15 @@ class Downlink(LeafSystem):
         output.set_value(self.now(context).transit.arrived)
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        held, t = state.get_mutable_abstract_state(self._state), context.get_time()
+        t = context.get_time()
         now, heard = self.now(context), self._heard.Eval(context)
         left = {ugv for ugv, lost_s in enumerate(self._lost) if t >= lost_s - SAME_S}
         after = self._carried(now, repeated(now.box, heard, t, self._retry, left), t)
         unread = heard.arrived[len(now.read_s) :]
         if unread:
-            read_s = tuple(nan if delivery.message.ugv in left else t for delivery in unread)
-            after = replace(after, read_s=now.read_s + read_s)
-        if after is held.get_value():
-            return EventStatus.DidNothing()
-        held.set_value(after)
-        return EventStatus.Succeeded()
+            read_s = [nan if delivery.message.ugv in left else t for delivery in unread]
+            after = replace(after, read_s=now.read_s.plus(read_s))
+        return keep(state, self._state, after)
 
 
 class Uplink(LeafSystem):
@@ -123,9 +123,4 @@ class Uplink(LeafSystem):
         output.set_value(self._link.carry(before, self._outbox.Eval(context), context.get_time()))
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        held = state.get_mutable_abstract_state(self._state)
-        now = self.now(context)
-        if now is held.get_value():
-            return EventStatus.DidNothing()
-        held.set_value(now)
-        return EventStatus.Succeeded()
+        return keep(state, self._state, self.now(context))
