@@ -507,7 +507,7 @@ class WayBack:
 
 @dataclass(slots=True)
 class Channel:
-    """What happens to messages between UAV and UGVs. Without it they arrive at once, and none is lost.
+    """What happens to messages between UAVs and UGVs. Without it they arrive at once, and none is lost.
 
     The fate of a message depends on `seed`, its link, its number and how often it was sent before, and on nothing else:
     with another delay the same messages are lost. Who waits for an answer repeats the message after twice the delay,

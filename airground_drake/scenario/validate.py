@@ -85,18 +85,6 @@ def _charges(scenario: Scenario) -> Problems:
             yield f"ugvs.{ugv}", Fault("in no UAV's charge"), allowed
 
 
-def _channel(scenario: Scenario) -> Problems:
-    """A channel is between one UAV, which is there to the end, and its UGVs."""
-    if scenario.channel is None:
-        return
-    if len(scenario.aerial) > 1:
-        yield "channel", Fault("of several UAVs"), "a channel of one UAV; with several messages arrive at once"
-    for name, uav in scenario.aerial.items():
-        if uav.lost_at_s:
-            key = f"{scenario.key_of(name)}.lost_at_s"
-            yield key, uav.lost_at_s, "0 with a channel; up: {loss: ...} with burst_s makes a UAV deaf for a time"
-
-
 def _names(scenario: Scenario) -> Problems:
     keys = [(f"ugvs.{name}", name) for name in scenario.ugvs]
     keys += [(f"uavs.{name}" if scenario.uavs else "uav.name", name) for name in scenario.aerial]
@@ -626,6 +614,6 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _uavs, _charges, _channel, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends,
+    _uavs, _charges, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends,
     _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget, _reproduction, _choices,
 )  # fmt: skip

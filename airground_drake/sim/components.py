@@ -67,6 +67,12 @@ def make_links(channel: Channel) -> tuple[Link, Link]:
     return Link(down, channel.seed, "down"), Link(up, channel.seed, "up")
 
 
+def lost_at(scenario: Scenario) -> list[float]:
+    """When the UAV of each UGV is lost, s; infinite: never."""
+    lost = {ugv: scenario.aerial[uav].lost_at_s or np.inf for uav in scenario.aerial for ugv in scenario.in_charge(uav)}
+    return [lost[ugv] for ugv in scenario.ugvs]
+
+
 def repeats_after(scenario: Scenario) -> float:
     """After how long a message is repeated to which no answer has come, s; without a channel never."""
     if scenario.channel is None:
@@ -210,14 +216,11 @@ GatekeepersFactory = Callable[[Scenario, UgvLaw], Gatekeepers]
 def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
     """Gatekeepers by problem (26) where interventions have priority over avoidance, else by outcomes."""
     world, presets = make_world(scenario), make_presets(scenario)
-    made: Gatekeepers
+    seen = frozenset(mover.name for mover in make_movers(scenario) if mover.known)
     if law.intervention_on_top:
         rules = make_horizon(scenario), make_rules(scenario)
-        made = PaperGatekeepers(world, law, presets, make_route(scenario), *rules)
-    else:
-        made = OutcomeGatekeepers(world, law, presets, make_outlook(scenario), make_patience(scenario))
-    made.unreported = frozenset(mover.name for mover in make_movers(scenario) if mover.known)
-    return made
+        return PaperGatekeepers(world, law, presets, make_route(scenario), *rules, seen)
+    return OutcomeGatekeepers(world, law, presets, make_outlook(scenario), make_patience(scenario), seen)
 
 
 def make_trigger(scenario: Scenario, zeta: float) -> Trigger:

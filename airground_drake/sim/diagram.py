@@ -174,8 +174,8 @@ def build_model(
     links = None
     if channel:
         down, up = components.make_links(channel)
-        (planner,) = plans.values()
-        links = Downlink(down, planner.start(), period, retry), Uplink(up, period)
+        start, sent = next(iter(plans.values())).start(), _named("sent", plans).values()
+        links = Downlink(down, sent, start, period, retry, components.lost_at(scenario)), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}
     if scenario.sensing:
         parts["sensing"] = PositionSensing(Errors(scenario.sensing, world), world)
@@ -261,10 +261,15 @@ def _task_planning(
         systems |= {"all_proposals": asks, "uav_command": flies}
         for k, uav in enumerate(uavs):
             wires.append((planners[uav].GetOutputPort("proposals"), asks.GetInputPort(f"proposals_{uav}")))
+            wires.append((asks.GetOutputPort("proposals"), planners[uav].GetInputPort("proposals")))
             wires.append((uavs[uav].GetOutputPort("command"), flies.get_input_port(k)))
+    sent = {
+        name: planners[uav].GetOutputPort("sent")
+        for uav, name in _named("sent", planners).items() if planners[uav].HasOutputPort("sent")
+    }  # fmt: skip
     named = {
         "reference": reference.get_output_port(),
-        **{port.get_name(): port for port in _outputs(asks)},
+        **(sent or {"proposals": asks.GetOutputPort("proposals")}),
         "ugv_command": ugvs.GetOutputPort("command"),
         "executing": ugvs.GetOutputPort("executing"),
         **({"command_share": ugvs.GetOutputPort("command_share")} if ugvs.HasOutputPort("command_share") else {}),
@@ -277,7 +282,7 @@ def _task_planning(
 
 
 def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:
-    """Names of a block of each UAV: that of the block, and with several UAVs of the UAV."""
+    """Names of a block or port of each UAV: that of the block, and with several UAVs of the UAV."""
     names = [*uavs]
     return {uav: block if len(names) == 1 else f"{block}_{uav}" for uav in names}
 

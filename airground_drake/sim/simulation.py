@@ -204,7 +204,7 @@ class Recorder:
         return trace_of(self._scenario, self._name, model.world, done, model.signals, self._own_plants)
 
 
-def carried_by(model: Model, root: Context) -> list[tuple[Transit, tuple[float, ...]]]:
+def carried_by(model: Model, root: Context) -> list[tuple[Transit, Sequence[float]]]:
     """What each link of the channel carried, and when what arrived was read, s; empty without a channel."""
     if model.links is None or model.answering is None:
         return []

@@ -7,10 +7,12 @@ state is kept, a value may be computed twice, and a run with another delay loses
 import math
 import random
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple, Self
 
+from airground_drake.base.history import History
 from airground_drake.model.bodies.motion import SAME_S
 
 Kind = Literal["proposal", "withdrawal", "answer"]
@@ -43,8 +45,8 @@ class Transit:
 
     taken: int = 0  # messages taken from the sender
     under_way: tuple[Delivery, ...] = ()  # by time of arrival
-    arrived: tuple[Delivery, ...] = ()  # by time of arrival
-    lost: tuple[Message, ...] = ()
+    arrived: History[Delivery] = field(default_factory=History)  # by time of arrival
+    lost: History[Message] = field(default_factory=History)
     # per UGV, of the messages that arrived, the one sent last
     newest: dict[int, Delivery] = field(default_factory=dict)
 
@@ -72,7 +74,7 @@ class Link:
     seed: int
     name: str  # of the link; links of different names have nothing in common
 
-    def carry(self, before: Transit, sent: tuple[Message, ...], t: float) -> Transit:
+    def carry(self, before: Transit, sent: Sequence[Message], t: float) -> Transit:
         """The state at time t, s, when so many messages have been sent since the beginning."""
         now = before
         if len(sent) > before.taken:
@@ -85,11 +87,11 @@ class Link:
             last = newest.get(delivery.message.ugv)
             if last is None or delivery.order > last.order:
                 newest[delivery.message.ugv] = delivery
-        arrived = now.arrived + now.under_way[:due]
+        arrived = now.arrived.plus(now.under_way[:due])
         return replace(now, under_way=now.under_way[due:], arrived=arrived, newest=newest)
 
-    def _taken(self, before: Transit, sent: tuple[Message, ...]) -> Transit:
-        under_way, lost = list(before.under_way), list(before.lost)
+    def _taken(self, before: Transit, sent: Sequence[Message]) -> Transit:
+        under_way, lost = list(before.under_way), list[Message]()
         for order in range(before.taken, len(sent)):
             message = sent[order]
             delays = self.fate(message)
@@ -102,7 +104,7 @@ class Link:
             under_way += [
                 Delivery(max(message.sent_s + delay, ahead), order, copy, message) for copy, delay in enumerate(delays)
             ]
-        return replace(before, taken=len(sent), under_way=tuple(sorted(under_way)), lost=tuple(lost))
+        return replace(before, taken=len(sent), under_way=tuple(sorted(under_way)), lost=before.lost.plus(lost))
 
     def fate(self, message: Message) -> list[float]:
         """By how much each copy of a message is late, s; none if it is lost."""

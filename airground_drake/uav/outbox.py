@@ -1,13 +1,14 @@
-"""What a UAV sends over a channel that may lose messages: everything until it has been read.
+"""What UAVs send over a channel that may lose messages: everything until it has been read.
 
 A proposal is repeated until an answer names it or a newer one; a withdrawal, until the UGV says that it does not hold
-the proposal, or gets another one.
+the proposal, or gets another one. A UAV that is lost repeats nothing.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
+from airground_drake.base.history import History
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.uav.channel import Delivery, Message, Transit
 from airground_drake.uav.messages import SILENT, Report, Reports
@@ -16,11 +17,10 @@ from airground_drake.uav.planner import PlannerState
 
 @dataclass(frozen=True)
 class Outbox:
-    """All that a UAV has sent, and what it waits for."""
+    """All that UAVs have sent, and what they wait for."""
 
-    proposals: int = 0  # of those of the planner, taken
-    withdrawn: int = 0  # of these, too
-    messages: tuple[Message, ...] = ()
+    taken: tuple[tuple[int, int], ...] = ()  # of each UAV, proposals and withdrawals of its planner that were posted
+    messages: History[Message] = field(default_factory=History)
     waiting: Mapping[int, Message] = field(default_factory=dict)  # per UGV, the message to repeat, as last sent
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
@@ -28,24 +28,32 @@ class Outbox:
         return self
 
 
-def posted(box: Outbox, memory: PlannerState) -> Outbox:
-    """With what the planner has sent since; nobody waits any more for what was said to the same UGV before."""
-    if (box.proposals, box.withdrawn) == (len(memory.sent), len(memory.withdrawn)):
+def posted(box: Outbox, memories: Sequence[PlannerState]) -> Outbox:
+    """With what the planners have sent since; nobody waits any more for what was said to the same UGV before."""
+    taken = tuple((len(memory.sent), len(memory.withdrawn)) for memory in memories)
+    if box.taken == taken:
         return box
-    to = {proposal.number: i for i, proposal in memory.sent}
-    withdrawn = [
-        Message("withdrawal", box.withdrawn + k, number, to[number], t)
-        for k, (number, t) in enumerate(memory.withdrawn[box.withdrawn :])
-    ]
-    proposals = [Message("proposal", p.number, p.number, i, p.issued, 0, p) for i, p in memory.sent[box.proposals :]]
-    new = sorted([*withdrawn, *proposals], key=lambda message: message.sent_s)  # of one instant, withdrawals first
+    before, new = box.taken or ((0, 0),) * len(taken), list[Message]()
+    count = sum(withdrawn for _, withdrawn in before)
+    for memory, (proposals, withdrawn) in zip(memories, before, strict=True):
+        to = {proposal.number: i for i, proposal in memory.sent}
+        gone = memory.withdrawn[withdrawn:]
+        new += [Message("withdrawal", count + k, number, to[number], t) for k, (number, t) in enumerate(gone)]
+        new += [Message("proposal", p.number, p.number, i, p.issued, 0, p) for i, p in memory.sent[proposals:]]
+        count += len(gone)
+    new.sort(key=lambda message: message.sent_s)  # of one instant, a UAV's withdrawals first
     waiting = {**box.waiting, **{message.ugv: message for message in new}}
-    return Outbox(len(memory.sent), len(memory.withdrawn), box.messages + tuple(new), waiting)
+    return Outbox(taken, box.messages.plus(new), waiting)
 
 
-def repeated(box: Outbox, heard: Transit, t: float, retry_s: float) -> Outbox:
+def repeated(box: Outbox, heard: Transit, t: float, retry_s: float, left: Collection[int] = ()) -> Outbox:
     """With what is sent again at time t, s, after `retry_s` without the answer that is waited for."""
-    waiting = {ugv: message for ugv, message in box.waiting.items() if not _was_read(message, heard.newest.get(ugv))}
+    # left: UGVs whose UAV is lost
+    waiting = {
+        ugv: message
+        for ugv, message in box.waiting.items()
+        if ugv not in left and not _was_read(message, heard.newest.get(ugv))
+    }
     again = [
         message._replace(sent_s=t, attempt=message.attempt + 1)
         for message in waiting.values()
@@ -54,7 +62,7 @@ def repeated(box: Outbox, heard: Transit, t: float, retry_s: float) -> Outbox:
     if len(waiting) == len(box.waiting) and not again:
         return box
     return replace(
-        box, messages=box.messages + tuple(again), waiting={**waiting, **{message.ugv: message for message in again}}
+        box, messages=box.messages.plus(again), waiting={**waiting, **{message.ugv: message for message in again}}
     )
 
 

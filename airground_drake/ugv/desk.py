@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
+from airground_drake.base.history import History
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.uav.channel import Delivery, Message
 from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, Reports, Told, answer_to
@@ -26,8 +27,10 @@ class Desk:
     held: Proposals  # the proposals in force, one entry per UGV
     newest: tuple[int, ...]  # the highest number of a proposal that each has read of, (n,)
     last: tuple[Message | None, ...]  # the last answer of each
-    read_s: tuple[float, ...] = ()  # when each message that arrived was read, s, in the order of arrival
-    outbox: tuple[Message, ...] = ()  # all answers
+    read_s: History[float] = field(
+        default_factory=History
+    )  # when each message that arrived was read, s, in the order of arrival
+    outbox: History[Message] = field(default_factory=History)  # all answers
 
     @classmethod
     def empty(cls, count: int) -> Desk:
@@ -52,7 +55,7 @@ def read(desk: Desk, arrived: Sequence[Delivery], t: float) -> Desk:
         elif message.kind == "proposal" and number > newest[i]:
             held[i] = message.content
         newest[i] = max(newest[i], number)
-    return replace(desk, held=tuple(held), newest=tuple(newest), read_s=(*desk.read_s, *(t for _ in new)))
+    return replace(desk, held=tuple(held), newest=tuple(newest), read_s=desk.read_s.plus([t] * len(new)))
 
 
 def replied(
@@ -60,7 +63,7 @@ def replied(
 ) -> tuple[Desk, int]:
     """After answering at time t, s, and how many answers there are then."""
     # asked: UGVs that have read a message at this sample. A report with a new number is a new answer to what is held.
-    last, outbox = list(desk.last), list(desk.outbox)
+    last, new = list(desk.last), list[Message]()
     for i, (held, newest, report, before) in enumerate(zip(desk.held, desk.newest, reports, desk.last, strict=True)):
         verdict = answer_to(held, answers, i)
         content = Told(verdict, report, newest, -1 if held is None else held.number)
@@ -74,10 +77,10 @@ def replied(
         else:
             continue
         last[i] = message
-        outbox.append(message)
-    if len(outbox) == len(desk.outbox):
+        new.append(message)
+    if not new:
         return desk, told
-    return replace(desk, last=tuple(last), outbox=tuple(outbox)), told
+    return replace(desk, last=tuple(last), outbox=desk.outbox.plus(new)), told
 
 
 @dataclass(frozen=True)

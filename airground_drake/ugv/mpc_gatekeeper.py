@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from time import thread_time
 from typing import Any, Self
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, described, one_line, raised_as, short
+from airground_drake.base.history import History
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
@@ -53,7 +54,7 @@ class GatekeeperState:
     # under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m)
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     # all decisions of the run so far
-    made: tuple[GatekeeperDecision, ...] = ()
+    made: History[GatekeeperDecision] = field(default_factory=History)
 
     @classmethod
     def empty(cls, count: int, *, channel: bool = False) -> GatekeeperState:
@@ -84,13 +85,14 @@ class Gatekeepers(abc.ABC):
 
     Attributes:
         law: their control law, with the scenario's gains.
-        unreported: names of obstacles that move and that the UAV sees itself.
     """
 
-    unreported: frozenset[str] = frozenset()
-
-    def __init__(self, world: World, law: UgvLaw, presets: Sequence[Motion]) -> None:
+    def __init__(
+        self, world: World, law: UgvLaw, presets: Sequence[Motion], unreported: Collection[str] = frozenset()
+    ) -> None:
+        # unreported: names of obstacles that move and that the UAV sees itself
         self.law = law
+        self._unreported = unreported
         self._presets = tuple(presets)
         self._world = world
         self._near = world.around(world.select("ugv"))
@@ -142,7 +144,7 @@ class Gatekeepers(abc.ABC):
             answers[2 * i : 2 * i + 2] = verdict, number
         return replace(
             before, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), told=told,
-            made=(*before.made, *decisions),
+            made=before.made.plus(decisions),
         )  # fmt: skip
 
     def _news(
@@ -164,7 +166,7 @@ class Gatekeepers(abc.ABC):
             return ()
         beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
         every = sightings(self._world, now.t, now.positions)
-        return tuple(sighting for sighting in every if sighting.name in beside - self.unreported)
+        return tuple(sighting for sighting in every if sighting.name in beside.difference(self._unreported))
 
     def _view(self, now: Inputs, i: int) -> View:
         """All obstacles at rest and robots around a UGV, and the obstacles that move within sensing range."""
@@ -192,10 +194,11 @@ class PaperGatekeepers(Gatekeepers):
     """Method (c): problem (26) at every sample, and the first stage of its plan is the answer."""
 
     def __init__(
-        self, world: World, law: UgvLaw, presets: Sequence[Motion], route: Route, horizon: Horizon, rules: Rules
-    ) -> None:
+        self, world: World, law: UgvLaw, presets: Sequence[Motion], route: Route, horizon: Horizon, rules: Rules,
+        unreported: Collection[str] = frozenset(),
+    ) -> None:  # fmt: skip
         """The route solves (26) over the horizon, and the rules lead to the answer."""
-        super().__init__(world, law, presets)
+        super().__init__(world, law, presets, unreported)
         self._route, self._horizon, self._rules = route, horizon, rules
 
     @property

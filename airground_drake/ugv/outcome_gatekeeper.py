@@ -11,7 +11,7 @@ Each UGV judges its own part of a joint plan, and executes it when it accepts.
 Safety does not rest on this: an accepted motion is executed below the avoidance inequalities.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from time import thread_time
 
@@ -49,10 +49,11 @@ class OutcomeGatekeepers(Gatekeepers):
     """The UGVs of a team under method (d)."""
 
     def __init__(
-        self, world: World, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience
-    ) -> None:
+        self, world: World, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience,
+        unreported: Collection[str] = frozenset(),
+    ) -> None:  # fmt: skip
         """Of the UGVs of a world: their law, their preset trajectories, how far they look and how long they wait."""
-        super().__init__(world, law, presets)
+        super().__init__(world, law, presets, unreported)
         self._outlook, self._patience = outlook, patience
         self._ugvs = world.names("ugv")
 

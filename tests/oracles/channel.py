@@ -104,11 +104,14 @@ def retry_s(trace: Trace) -> float:
 
 
 def _repeated_otherwise(trace: Trace) -> Iterator[Fault]:
-    """A message of the UAV is repeated until it was read or replaced; a UGV repeats no more often than it may."""
+    """A UAV repeats a message until it was read or replaced, or the UAV is lost; a UGV, no more often than it may."""
     period, told = trace.scenario.control.period_s, {*trace.decisions["answer"]}
     copies = [row for row in rows_of(trace) if row["copy"] == 0]
     for ugv in trace.ugvs:
         mine = sorted((row for row in copies if row["receiver"] == ugv), key=lambda row: row["sent_s"])
+        lost_s = min([trace.scenario.aerial[row["sender"]].lost_at_s or np.inf for row in mine], default=np.inf)
+        if mine and mine[-1]["sent_s"] > lost_s - TIME_TOLERANCE_S:
+            yield Fault("repeated by a UAV that is lost", ugv, float(mine[-1]["sent_s"]), lost_s)
         for row, later in pairwise([*mine, {"sent_s": trace.t[-1], "about": -1, "kind": ""}]):
             again = (later["kind"], later["about"]) == (row["kind"], row["about"])
             answered = _read_s(trace, ugv, row, told)
@@ -117,7 +120,7 @@ def _repeated_otherwise(trace: Trace) -> Iterator[Fault]:
                 yield Fault("repeated at another time", ugv, float(later["sent_s"]), due)
             if again and answered < later["sent_s"] - TIME_TOLERANCE_S:
                 yield Fault("repeated though it was read", ugv, float(later["sent_s"]), answered)
-            if not again and due + period < min(answered, float(later["sent_s"])) - TIME_TOLERANCE_S:
+            if not again and due + period < min(answered, float(later["sent_s"]), lost_s) - TIME_TOLERANCE_S:
                 yield Fault("not repeated", ugv, float(row["sent_s"]), due)
         read = sum(np.isfinite(row["read_s"]) for row in rows_of(trace) if row["receiver"] == ugv)
         answers = [row for row in copies if row["sender"] == ugv]

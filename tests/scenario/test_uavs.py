@@ -72,8 +72,6 @@ MISTAKES = [
     (of({"one": NORTH, "south": SOUTH}), "ugvs.one: 'one' is not allowed; a name that no other UGV"),
     (of(BOTH, safe_distance__collision_m=1.0), "safe_distance.collision_m: 1.0 is not allowed; less than"),
     (of(BOTH, uavs__south__lost_at_s=-1), "uavs.south.lost_at_s: -1.0 is not allowed; wanted: a number in s from 0"),
-    (of(BOTH, channel={}), "channel: of several UAVs; a channel of one UAV"),
-    (edit(edit(SMALL_DATA, "uav.lost_at_s", 1), "channel", {}), "uav.lost_at_s: 1.0 is not allowed; 0 with a channel"),
     (of(BOTH, uavs__south__lost_s=1), "uavs.south.lost_s: unknown key; did you mean lost_at_s"),
     (of(BOTH, safe_distance__uav_m=3, control__sensing_range_m=3.1), "3.1 is not allowed; at least 3.5 m for south"),
 ]  # fmt: skip

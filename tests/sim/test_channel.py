@@ -31,9 +31,12 @@ def over(given: Channel | None, scenario: str = "lab", run: str = "d", *more: st
     return simulate(replace(load(scenario, [*more]), channel=given), run)
 
 
-@pytest.mark.parametrize(("scenario", "name"), [("case_b", "b"), ("case_b", "c"), ("case_b", "d"), ("doorway", "d")])
-def test_a_channel_that_does_nothing_changes_nothing(scenario: str, name: str) -> None:
-    without, silent = over(None, scenario, name), over(Channel(), scenario, name)
+@pytest.mark.parametrize(("scenario", "name", "more"), [
+    ("case_b", "b", ()), ("case_b", "c", ()), ("case_b", "d", ()), ("doorway", "d", ()),
+    ("two_uavs", "d", ("uavs.south.lost_at_s=0", "duration_s=16")),
+])  # fmt: skip
+def test_a_channel_that_does_nothing_changes_nothing(scenario: str, name: str, more: tuple[str, ...]) -> None:
+    without, silent = over(None, scenario, name, *more), over(Channel(), scenario, name, *more)
     for table in ("states", "samples", "decisions", "proposals", "plans"):
         both = (getattr(trace, table).drop(columns="answer", errors="ignore") for trace in (without, silent))
         pd.testing.assert_frame_equal(*both, check_exact=True)
@@ -69,6 +72,30 @@ def test_whatever_the_channel_does_the_protocol_is_kept(given_: Channel, run: st
     if run == "d":
         verdicts = {verdict.claim.id: verdict.status for verdict in judge(trace)}
         assert {verdicts[claim] for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP")} == {"holds"}
+
+
+@given(given_=CHANNELS, lost_at_s=st.sampled_from([0.0, 8.4, 9.13, 11.0]), run=st.sampled_from("bdd"))
+@examples(2, 200)
+def test_with_two_uavs_the_protocol_is_kept(given_: Channel, lost_at_s: float, run: str) -> None:
+    settings = ("duration_s=15", f"uavs.south.lost_at_s={lost_at_s}", f"runs={{{run}: {{method: {run}}}}}")
+    trace = over(given_, "two_uavs", run, *settings)
+    assert not faults_of(trace)
+    if run == "d":
+        verdicts = {verdict.claim.id: verdict.status for verdict in judge(trace)}
+        assert {verdicts[claim] for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP", "GATE-PLAN")} == {"holds"}
+
+
+LOST = ("duration_s=11.2", "uavs.south.lost_at_s=9.3")
+"""South is lost after it has repeated something, and before all answers are there."""
+
+
+def test_a_uav_that_is_lost_repeats_nothing_and_hears_nothing() -> None:
+    trace, lost_s = over(Channel(0.4, loss=0.4, seed=2), "two_uavs", "d", *LOST), 9.3
+    of_south = trace.messages[trace.messages["sender"] == "south"]
+    assert of_south["attempt"].max() > 0
+    assert of_south["sent_s"].max() < lost_s < of_south["received_s"].max()
+    told = trace.messages[trace.messages["receiver"] == "south"]
+    assert told["read_s"].max() < lost_s < told["received_s"].max()
 
 
 @pytest.mark.slow
@@ -132,6 +159,12 @@ def test_a_protocol_with_a_fault_is_noticed(name: str, monkeypatch: pytest.Monke
     scenario, settings = ("case_b", ["reproduction=[]"]) if given_ is not NOISY else ("lab", [])
     found = faults_of(over(given_, scenario, "d", *settings))
     assert any(fault.what.startswith(what) for faults in found.values() for fault in faults), found
+
+
+def test_a_lost_uav_that_repeats_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(channel, "repeated", lambda *given: repeated(*given[:4]))
+    trace = over(Channel(0.4, loss=0.4, seed=2), "two_uavs", "d", *LOST)
+    assert {fault.what for fault in faults_of(trace)["channel"]} == {"repeated by a UAV that is lost"}
 
 
 def test_an_idle_link_keeps_its_state() -> None:

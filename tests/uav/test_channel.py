@@ -90,8 +90,8 @@ def heard(*told: tuple[int, Told]) -> Transit:
 
 
 def test_a_proposal_is_repeated_until_an_answer_names_it_or_a_newer_one() -> None:
-    box = posted(Outbox(), PlannerState((), sent=((0, proposal(4, 1.0)),)))
-    assert posted(box, PlannerState((), sent=((0, proposal(4, 1.0)),))) is box
+    box = posted(Outbox(), [PlannerState((), sent=((0, proposal(4, 1.0)),))])
+    assert posted(box, [PlannerState((), sent=((0, proposal(4, 1.0)),))]) is box
     assert repeated(box, Transit(), 1.4, 0.5) is box
     again = repeated(box, heard((3, Told(newest=3))), 1.5, 0.5)
     assert [(m.kind, m.about, m.sent_s, m.attempt) for m in again.messages] == [
@@ -106,15 +106,27 @@ def test_a_proposal_is_repeated_until_an_answer_names_it_or_a_newer_one() -> Non
 
 def test_a_withdrawal_is_repeated_until_the_ugv_holds_the_proposal_no_more_or_gets_another() -> None:
     sent = ((0, proposal(4, 1.0)),)
-    box = posted(Outbox(), PlannerState((), sent=sent, withdrawn=((4, 2.0),)))
+    box = posted(Outbox(), [PlannerState((), sent=sent, withdrawn=((4, 2.0),))])
     assert [message.kind for message in box.messages] == ["proposal", "withdrawal"]
     assert [message.kind for message in box.waiting.values()] == ["withdrawal"]
     for told, waits in ((Told(newest=4, holds=4), True), (Told(newest=4), False), (Told(newest=6, holds=6), False)):
         assert bool(repeated(box, heard((told.newest, told)), 9.0, 0.5).waiting) == waits
-    more = posted(box, PlannerState((), sent=(*sent, (0, proposal(5, 3.0))), withdrawn=((4, 2.0),)))
+    more = posted(box, [PlannerState((), sent=(*sent, (0, proposal(5, 3.0))), withdrawn=((4, 2.0),))])
     assert [(message.kind, message.about) for message in more.waiting.values()] == [("proposal", 5)]
 
 
 def test_the_uav_goes_by_the_answer_that_was_sent_last() -> None:
     late = heard((1, Told(1.0, newest=1)), (2, Told(-1.0, newest=2)))
     assert answers_heard(late, range(2))[0] == [-1.0, 2.0, 0.0, -1.0]
+
+
+def test_several_uavs_share_numbers_of_withdrawals_and_a_lost_one_repeats_nothing() -> None:
+    north = PlannerState((), sent=((0, proposal(0, 1.0)),), withdrawn=((0, 2.0),))
+    south = PlannerState((), sent=((1, proposal(1, 1.0)), (2, proposal(3, 1.0))), withdrawn=((3, 2.0),))
+    box = posted(posted(Outbox(), [PlannerState(()), south]), [north, south])
+    assert sorted(message.number for message in box.messages if message.kind == "withdrawal") == [0, 1]
+    assert {ugv: (message.kind, message.about) for ugv, message in box.waiting.items()} == {
+        0: ("withdrawal", 0), 1: ("proposal", 1), 2: ("withdrawal", 3),
+    }  # fmt: skip
+    later = repeated(box, Transit(), 9.0, 0.5, {1, 2})
+    assert [message.ugv for message in later.messages[len(box.messages) :]] == [*later.waiting] == [0]

@@ -1,16 +1,21 @@
-"""The channel between a UAV and its UGVs, as two LeafSystems.
+"""The channel between UAVs and their UGVs, as two LeafSystems.
 
 What a link delivers is computed from its state, its input and the time; the update at each control period stores the
 same. So a link without delay and loss delays nothing, not even by a period.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from math import nan
 from typing import Any, Self
 
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State, ValueProducer
 
+from airground_drake.base.history import History
+from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.signals import keep
 from airground_drake.uav.channel import Link, Transit
 from airground_drake.uav.outbox import Outbox, posted, repeated
 from airground_drake.uav.planner import PlannerState
@@ -18,11 +23,12 @@ from airground_drake.uav.planner import PlannerState
 
 @dataclass(frozen=True)
 class Down:
-    """The state of the link from a UAV."""
+    """The state of the link from UAVs."""
 
     box: Outbox = field(default_factory=Outbox)
     transit: Transit = field(default_factory=Transit)
-    read_s: tuple[float, ...] = ()  # when the UAV read each answer that arrived, s, in the order of arrival
+    # when its UAV read each answer that arrived, s, in the order of arrival; NaN: never
+    read_s: History[float] = field(default_factory=History)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Immutable: the copy is the object itself."""
@@ -30,22 +36,26 @@ class Down:
 
 
 class Downlink(LeafSystem):
-    """From a UAV to its UGVs; the UAV repeats a message until an answer shows that the UGV has read it.
+    """From UAVs to their UGVs; a UAV repeats a message until an answer shows that the UGV has read it, or it is lost.
 
-    Ports: in `sent`, the planner's memory; `heard`, see `Uplink`, used by updates only; out `inbox`, all deliveries so
-    far, in the order of arrival.
+    Ports: in `sent`, the planner's memory, with several UAVs one of each, `sent_<uav>`; `heard`, see `Uplink`, used by
+    updates only; out `inbox`, all deliveries so far, in the order of arrival.
     State: abstract, a `Down`.
     Rate: one update per control period, from t = 0.
     """
 
-    def __init__(self, link: Link, start: PlannerState, period: float, retry: float) -> None:
-        """Of a link; a message is repeated after `retry`, s."""
+    def __init__(
+        self, link: Link, sent: Iterable[str], start: PlannerState, period: float, retry: float, lost: Sequence[float]
+    ) -> None:
+        """Of a link, with the ports `sent`; a message is repeated after `retry`, s."""
+        # lost: per UGV, from when on its UAV is lost, s; infinite: never
         super().__init__()
-        self._link, self._retry = link, retry
-        self._sent = self.DeclareAbstractInputPort("sent", Value(start))
+        self._link, self._retry, self._lost = link, retry, lost
+        self._sent = [self.DeclareAbstractInputPort(name, Value(start)) for name in sent]
         self._heard = self.DeclareAbstractInputPort("heard", Value(Transit()))
         held = self.DeclareAbstractState(Value(Down()))
-        self._state, needs = int(held), {self.abstract_state_ticket(held), self._sent.ticket(), self.time_ticket()}
+        self._state = int(held)
+        needs = {self.abstract_state_ticket(held), *(port.ticket() for port in self._sent), self.time_ticket()}
         producer = ValueProducer(allocate=lambda: Value(Down()), calc=weakly(self._calc))
         self._now = self.DeclareCacheEntry("now", producer, needs).cache_index()
         self.DeclareAbstractOutputPort(
@@ -60,7 +70,7 @@ class Downlink(LeafSystem):
 
     def _calc(self, context: Context, output: AbstractValue) -> None:
         before: Down = context.get_abstract_state(self._state).get_value()
-        box = posted(before.box, self._sent.Eval(context))
+        box = posted(before.box, [port.Eval(context) for port in self._sent])
         output.set_value(self._carried(before, box, context.get_time()))
 
     def _carried(self, before: Down, box: Outbox, t: float) -> Down:
@@ -73,20 +83,19 @@ class Downlink(LeafSystem):
         output.set_value(self.now(context).transit.arrived)
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        held, t = state.get_mutable_abstract_state(self._state), context.get_time()
+        t = context.get_time()
         now, heard = self.now(context), self._heard.Eval(context)
-        after = self._carried(now, repeated(now.box, heard, t, self._retry), t)
-        unread = len(heard.arrived) - len(now.read_s)
+        left = {ugv for ugv, lost_s in enumerate(self._lost) if t >= lost_s - SAME_S}
+        after = self._carried(now, repeated(now.box, heard, t, self._retry, left), t)
+        unread = heard.arrived[len(now.read_s) :]
         if unread:
-            after = replace(after, read_s=now.read_s + (t,) * unread)
-        if after is held.get_value():
-            return EventStatus.DidNothing()
-        held.set_value(after)
-        return EventStatus.Succeeded()
+            read_s = [nan if delivery.message.ugv in left else t for delivery in unread]
+            after = replace(after, read_s=now.read_s.plus(read_s))
+        return keep(state, self._state, after)
 
 
 class Uplink(LeafSystem):
-    """From UGVs to their UAV.
+    """From UGVs to their UAVs.
 
     Ports: in `outbox`, all answers sent so far; out `heard`, the state of the link.
     State: abstract, a `Transit`.
@@ -114,9 +123,4 @@ class Uplink(LeafSystem):
         output.set_value(self._link.carry(before, self._outbox.Eval(context), context.get_time()))
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        held = state.get_mutable_abstract_state(self._state)
-        now = self.now(context)
-        if now is held.get_value():
-            return EventStatus.DidNothing()
-        held.set_value(now)
-        return EventStatus.Succeeded()
+        return keep(state, self._state, self.now(context))

@@ -1,5 +1,6 @@
 """The UGVs' side of an intervention: accept or refuse (methods (c), (d)), or always accept (method (b))."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pydrake.common.value import AbstractValue, Value
@@ -14,6 +15,7 @@ from airground_drake.sim.blocks.signals import (
     declare_bodies,
     declare_headings,
     declare_inbox,
+    keep,
     laid_out,
     no_reports,
 )
@@ -76,7 +78,7 @@ class Gatekeeper(LeafSystem):
         """Name of the class that judges the proposals."""
         return self._gatekeepers.judges
 
-    def decisions(self, context: Context) -> tuple[GatekeeperDecision, ...]:
+    def decisions(self, context: Context) -> Sequence[GatekeeperDecision]:
         """All decisions up to the time of this Context."""
         return self._memory(context).made
 
@@ -176,9 +178,4 @@ class DirectAcceptance(LeafSystem):
         output.set_value(self.desk(context).outbox)
 
     def _update(self, context: Context, state: State) -> EventStatus:
-        held = state.get_mutable_abstract_state(self._state)
-        now = self._now(context)
-        if now is held.get_value():
-            return EventStatus.DidNothing()
-        held.set_value(now)
-        return EventStatus.Succeeded()
+        return keep(state, self._state, self._now(context))

@@ -38,7 +38,7 @@ class InterventionPlanner(LeafSystem):
             (abstract), see `messages`. With several UAVs `proposals` of all of them (see `AllProposals`).
         out `proposals` abstract, n of Proposal or None.
         With a channel `heard`, see `Uplink`, in place of answers and reports, and `sent`, the `PlannerState`, in place
-        of `proposals`.
+        of `proposals`; with several UAVs beside it.
     State: the last resting place of each UGV and since when, see `halts`; abstract, a `PlannerState`.
     Rate: one update per planning period, from t = 0. A proposal can act one period after it is made.
     """
@@ -69,7 +69,7 @@ class InterventionPlanner(LeafSystem):
             self.DeclareAbstractOutputPort(
                 "sent", lambda: Value(planner.start()), weakly(self._calc_sent), prerequisites_of_calc=remembers
             )
-        else:
+        if not (channel and alone):
             self.DeclareAbstractOutputPort(
                 "proposals", lambda: no_proposals(n), weakly(self._calc_proposals), prerequisites_of_calc=remembers
             )

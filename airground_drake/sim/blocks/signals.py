@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from pydrake.common.containers import namedview
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, InputPort, LeafSystem
+from pydrake.systems.framework import Context, EventStatus, InputPort, LeafSystem, State
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, short
@@ -61,6 +61,15 @@ def no_proposals(count: int) -> AbstractValue:
 def no_reports(count: int) -> AbstractValue:
     """Model value of the port `reports`: a tuple with a `Report` for each of `count` UGVs."""
     return Value((Report(),) * count)
+
+
+def keep(state: State, index: int, value: Any) -> EventStatus:
+    """Store a value in an abstract state, unless it is there."""
+    held = state.get_mutable_abstract_state(index)
+    if value is held.get_value():
+        return EventStatus.DidNothing()
+    held.set_value(value)
+    return EventStatus.Succeeded()
 
 
 def declare_inbox(
