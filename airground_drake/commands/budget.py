@@ -38,7 +38,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the budget, and draw it on request."""
     options = parser().parse_args(arguments)
     from airground_drake.scenario.budget import alike, budget
     from airground_drake.scenario.load import load
@@ -68,7 +67,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
-    """Distances and arrivals by the values of one key."""
     from airground_drake.scenario.document import parsed
     from airground_drake.study.campaign.vary import as_text, usual_values, vary
 
@@ -98,7 +96,6 @@ def _about(group: Sequence[PairBudget]) -> str:
 
 
 def _named(names: Sequence[str]) -> str:
-    """Some names, and how many more there are."""
     more = len(names) - MOST_NAMED
     return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 

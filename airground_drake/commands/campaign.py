@@ -163,7 +163,6 @@ def _summary(result: dict[str, Any], *, looked: bool) -> str:
 
 
 def _by_value(entry: dict[str, Any]) -> str:
-    """What became of the runs with one value of a swept key, as a line."""
     refuted = [claim for claim, counts in entry["claims"].items() if counts["refuted"]]
     times = [
         f"{words} {entry[name]:.4g} s"

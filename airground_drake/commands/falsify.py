@@ -54,7 +54,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Search; the exit codes are in the help."""
     options = parser().parse_args(arguments)
     if options.limit is not None and options.most is None:
         return refuse("--limit is of a time: name it with --most")
@@ -128,7 +127,6 @@ def _try(search: Search, pool: Pool) -> None:
 
 
 def _small(path: Path) -> Path:
-    """Where the smaller scenario is written."""
     return path.with_stem(f"{path.stem}_small")
 
 

@@ -27,7 +27,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the page, and print its path."""
     print(one_line(str(_write(parser().parse_args(arguments).folder))))
     return 0
 

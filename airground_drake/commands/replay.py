@@ -26,7 +26,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or serve the replays."""
     options = parser().parse_args(arguments)
     if options.video and not options.run:
         return refuse("--video needs a RUN")

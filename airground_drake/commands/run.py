@@ -37,7 +37,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Simulate, and print."""
     options = parser().parse_args(arguments)
     if options.speed and not options.meshcat:
         return refuse("--speed needs --meshcat")

@@ -40,7 +40,6 @@ AUDIT_DESCRIPTION = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line."""
     # Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error.
     options = parser().parse_args(arguments)
     if options.scenario is None and not options.list:
@@ -62,7 +61,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _reported(options: argparse.Namespace, command: str) -> int:
-    """Load the scenario and report on it."""
     from airground_drake.scenario.load import load
     from airground_drake.scenario.notes import notes
 

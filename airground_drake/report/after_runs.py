@@ -130,7 +130,6 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
 
 
 def versions() -> dict[str, str]:
-    """Versions of the package and of the libraries that its numbers depend on."""
     installed = {}
     for name in PACKAGES:
         try:

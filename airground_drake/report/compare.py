@@ -35,7 +35,6 @@ E = TypeVar("E", bound="Entry")
 
 
 def compared(before: Report, after: Report) -> dict[str, Any]:
-    """What differs."""
     # Returns strict JSON: `regressions`, a count; lists of changes `inputs`, `overall` (one at most), `verdicts`,
     # `margins`, `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None
     # if missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`, `kind` and
@@ -148,7 +147,6 @@ def _rows(before: Report, after: Report) -> Iterator[Change]:
 
 
 def _findings(before: Report, after: Report) -> Iterator[Change]:
-    """Findings about the paper."""
     for (number,), old, new in _paired(before.audit, after.audit, "id"):
         was, now = (finding and finding.model_dump(include={"demonstrated", "paper", "ours"}) for finding in (old, new))
         if was != now:

@@ -191,7 +191,6 @@ def _named(claims: Iterable[Mapping[str, Any]]) -> list[dict[str, str]]:
 
 
 def _listed(items: Sequence[Mapping[str, Any]]) -> str:
-    """The first few items in words."""
     more = f" and {len(items) - MOST_LISTED} more" if len(items) > MOST_LISTED else ""
     return ", ".join(map(_told, items[:MOST_LISTED])) + more
 

@@ -61,7 +61,6 @@ class RunFacts:
 
     @property
     def collided(self) -> bool:
-        """Whether any robot collided."""
         return bool(self.hits)
 
     @property
@@ -171,7 +170,6 @@ class RunFacts:
 
     @cached_property
     def arrived_s(self) -> dict[str, float]:
-        """When each robot arrived first, s."""
         return {event.robot: event.t_s for event in reversed(self.run.events) if event.kind == "arrival"}
 
     @property
@@ -184,7 +182,6 @@ class RunFacts:
 
     @property
     def lost_s(self) -> dict[str, float]:
-        """When UAVs were lost, s, by name."""
         until = self._scenario.duration_s
         return {name: uav.lost_at_s for name, uav in self._scenario.aerial.items() if 0.0 < uav.lost_at_s < until}
 
@@ -251,7 +248,6 @@ class RunFacts:
 
     @property
     def refusals(self) -> Counter[str]:
-        """How many proposals were refused for each reason."""
         ends = (sent.ended for sent in self._metrics.interventions if sent.accepted_s is None)
         return Counter(end.reason for end in ends if end.how == "refused")
 

@@ -84,7 +84,6 @@ CHIPS = {
 
 
 def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
-    """The page."""
     # figures: as drawn by `figures.draw` and the like, in the order of the page.
     # diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
     distances = [(name, pair) for name, run in report.runs.items() for pair in pairs(run)]
@@ -125,7 +124,6 @@ def render_beside(template: str, **content: Any) -> str:
 
 @cache
 def environment() -> Environment:
-    """Renders the report's page and those beside it."""
     environment = environment_of("airground_drake.report")
     style = stylesheet()
     script = _template(SCRIPT)
@@ -148,12 +146,10 @@ def _shown(claim: Claim) -> str:
 
 
 def stylesheet() -> str:
-    """The style sheet of all pages."""
     return _template(STYLE) + _in_the_dark()
 
 
 def _template(name: str) -> str:
-    """The text of a file among the templates."""
     return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
 
 
@@ -180,7 +176,6 @@ def _in_the_dark() -> str:
 
 
 def evidence_tables(claim: Claim) -> list[Table]:
-    """Counterexample and evidence of a claim as tables."""
     on = f", run {claim.run}" if claim.run else ""
     return [
         *evidence.tables(claim.counterexample or {}, f"{claim.id}, counterexample{on}"),

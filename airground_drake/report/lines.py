@@ -29,7 +29,6 @@ def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
 
 
 def short(value: Any, most: int = 120) -> str:
-    """A value for reading, cut if it is long."""
     text = repr(value)
     return text if len(text) <= most else f"{text[:most]}..."
 

@@ -296,7 +296,6 @@ def gap_m(trace: Trace, robot: str, other: str) -> Array:
 
 
 def radius_m(trace: Trace, name: str) -> float:
-    """Radius of a robot or an obstacle, m."""
     return trace.scenario.bodies[name].radius_m
 
 
@@ -310,7 +309,6 @@ def _others(trace: Trace, robot: str) -> list[str]:
 
 
 def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
-    """Events of a robot, by time, of the given kinds."""
     return [event for event in trace.events if event["robot"] == robot and event["kind"] in kinds]
 
 
@@ -324,7 +322,6 @@ def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[st
 
 
 def _listed(trace: Trace, gaps: dict[str, Gap]) -> dict[str, dict[str, Any]]:
-    """Smallest gaps as report.json lists them."""
     return {
         other: {
             "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,

@@ -32,12 +32,10 @@ class Near(NamedTuple):
 
     @property
     def whom(self) -> str:
-        """The other one in words."""
         return named(self.other, self.at_m)
 
     @property
     def is_short(self) -> bool:
-        """Whether the distance was not kept."""
         return self.margin_m < -SLACK_M
 
     def __str__(self) -> str:

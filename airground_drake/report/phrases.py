@@ -12,7 +12,6 @@ ROLES = ("first", "second", "robot", "other")  # keys that hold the name of a bo
 
 
 def found_no_way(names: Sequence[str]) -> str:
-    """For whom the UAV found no way."""
     return f"the UAV found no way for {joined(names) if len(names) <= MAX_NAMES else f'{len(names)} robots'}"
 
 
@@ -22,7 +21,6 @@ def place_of(claim: Claim) -> dict[str, Any]:
 
 
 def bodies_of(claim: Claim) -> list[str]:
-    """The bodies that a claim names."""
     place = place_of(claim)
     there = {role: place[role] for role in ROLES if isinstance(place.get(role), str)}
     return list(

@@ -62,7 +62,6 @@ def filled(page: str, proofs: Mapping[str, Any]) -> str:
 
 
 def _line(entry: Mapping[str, Any], coq: str) -> Markup:
-    """What the page says of a run, an entry of proofs.json."""
     answer = entry["distances"]
     near = answer.get("too_near", ())
     if answer["proved"]:

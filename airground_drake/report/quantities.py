@@ -20,7 +20,6 @@ def split(key: str) -> tuple[str, str]:
 
 
 def number(x: Any, digits: int = 4) -> str:
-    """A number for reading, a dash for none."""
     if x is None:
         return "\N{EN DASH}"
     if isinstance(x, bool) or not isinstance(x, (int, float)):

@@ -242,7 +242,6 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
 
 
 def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = False) -> Line:
-    """Compare a file with the text that it should have: exactly, except for drawings."""
     recorded = files.read_text(folder / name)
     for k, (theirs, ours) in enumerate(zip_longest(_DRAWING.split(recorded), _DRAWING.split(rebuilt))):
         drawings = bool(k % 2) and theirs is not None and ours is not None

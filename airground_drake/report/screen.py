@@ -89,7 +89,6 @@ class FirstScreen(NamedTuple):
 
 
 def first_screen(report: Report) -> FirstScreen:
-    """The first screen of a report."""
     rows = _rows(report)
     checks = [*_seeds(report), *_zeno(report), *_threshold(report, rows), *_paper(report)]
     within = f"within {report.scenario.resolved.arrival_tolerance_m:g} m"
@@ -192,7 +191,6 @@ def _arrived(run: RunFacts) -> Cell:
 
 
 def _named(names: Sequence[str]) -> str:
-    """Some names, and how many more."""
     some = ", ".join(names[:MOST_NAMES])
     return f"{some} and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else some
 
@@ -300,7 +298,6 @@ def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
 
 
 def _verdict(those: Iterable[Claim]) -> str:
-    """The mark of some claims together."""
     statuses = {claim.status for claim in those}
     return "no" if "refuted" in statuses else "yes" if statuses and statuses <= {*PASSING} else "open"
 

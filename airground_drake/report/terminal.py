@@ -14,7 +14,6 @@ COLUMNS, ANSWERS = (20, 29, 23, 22), (18, 80)
 
 
 def text(report: Report) -> str:
-    """The first screen."""
     screen = first_screen(report)
     lines = []
     for mark, told in screen.headline:

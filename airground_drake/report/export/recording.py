@@ -101,7 +101,6 @@ def _write(writer: Writer, messages: list[Message]) -> None:
 
 
 def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
-    """All messages of a run."""
     standing = stage_of(trace, scenario)
     yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_standing(standing))})
     looks = {robot: states(trace, robot, trace.t) for robot in trace.ugvs}
@@ -124,7 +123,6 @@ def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
 
 
 def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
-    """Signals of a robot in row k of the trace."""
     signals: dict[str, Any] = {
         "position_m": _vector(trace.body(robot)[k].tolist()),
         "command_m_s": _vector(trace.command(robot)[k].tolist()),

@@ -38,7 +38,6 @@ class Clock(NamedTuple):
 
     @property
     def shown_s(self) -> float:
-        """Time that is shown, s."""
         return float((self.end - self.begin).sum())
 
     @property
@@ -48,7 +47,6 @@ class Clock(NamedTuple):
 
     @property
     def length(self) -> float:
-        """Length of the axis, s."""
         return float(self.place[-1] + self.end[-1] - self.begin[-1])
 
     def at(self, t: Array | Sequence[float]) -> Array:
@@ -57,7 +55,6 @@ class Clock(NamedTuple):
         return np.asarray(np.interp(t, np.column_stack(knots).ravel(), np.column_stack(places).ravel()))
 
     def shows(self, t: Array) -> npt.NDArray[np.bool_]:
-        """Whether times are shown."""
         k = np.maximum(np.searchsorted(self.begin, t, side="right") - 1, 0)
         return np.asarray((self.begin[k] <= t) & (t <= self.end[k]))
 

@@ -216,7 +216,6 @@ def told(trace: Trace, ugv: str) -> str:
 
 
 def histogram(quantity: str, of_runs: Mapping[str, Sequence[float]]) -> Figure:
-    """Histogram of a quantity over the UGVs, a line per run."""
     figure = Figure(figsize=(WIDE_IN, 2.0))
     axes = figure.add_axes((0.13, 0.24, 0.6, 0.7))
     every = np.concatenate([np.asarray(values) for values in of_runs.values()])
@@ -243,7 +242,6 @@ def nearest_distance(trace: Trace, robot: str) -> Array:
 
 
 def _ends_s(trace: Trace) -> tuple[float, float]:
-    """Begin and end of an axis over the time of a run, s."""
     return float(trace.t[0]), float(trace.t[-1]) if len(trace.t) > 1 else float(trace.t[0]) + 1.0
 
 

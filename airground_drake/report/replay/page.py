@@ -19,7 +19,6 @@ MAX_EVENTS = 300  # events that are listed
 
 
 def page(scene: Scene) -> str:
-    """The page of a run."""
     html = str(recorded(scene).StaticHtml())
     if html.count("</body>") != 1 or "<head>" not in html:
         raise ReplayError("the page of this version of Drake's Meshcat has no place for the time slider")

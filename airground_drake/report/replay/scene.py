@@ -49,7 +49,6 @@ class Scene(Stage):
 
 
 def scene(trace: Trace, scenario: Scenario) -> Scene:
-    """The scene of a run."""
     times = frame_times(trace.t)
     still = stage_of(trace, scenario)
 

@@ -56,7 +56,6 @@ def write(scene: Scene, path: Path, speed: float) -> None:
 
 
 def _encoder(path: Path) -> AbstractMovieWriter:
-    """The encoder for a file, by its name."""
     if path.suffix not in SUFFIXES:
         raise ReplayError(f"{path}: no video of this kind; allowed: names that end in {' or '.join(SUFFIXES)}")
     if path.suffix == ".webp":

@@ -72,7 +72,6 @@ def barrier_path(k: int) -> str:
 
 
 def rgba(color: str, alpha: float = 1.0) -> Rgba:
-    """Drake's form of a colour #rrggbb."""
     return Rgba(*rgb(color), alpha)
 
 
@@ -84,7 +83,6 @@ def _cylinder(
 
 
 def _ground(meshcat: Meshcat, stage: Stage) -> None:
-    """Ground and camera."""
     for path in ("/Grid", "/Axes"):
         meshcat.SetProperty(path, "visible", False)
     for edge, shade in (("top_color", [0.93, 0.95, 0.97]), ("bottom_color", [0.98, 0.98, 0.98])):

@@ -155,7 +155,6 @@ def _draw_arena(axes: Axes, rings: Sequence[Array]) -> None:
 
 
 def _name_of(barrier: Barrier) -> Label:
-    """Its name, and when it is there."""
     since = f", from {barrier.appears_s:g} s" if barrier.appears_s else ""
     since += f", until {barrier.disappears_s:g} s" if np.isfinite(barrier.disappears_s) else ""
     return Label(barrier.place_m, f"{short(barrier.name, 12)}{since}", size_pt=7.5)

@@ -59,12 +59,10 @@ class Barrier:
 
     @property
     def color(self) -> str:
-        """#rrggbb."""
         return OBSTACLE_COLOR if self.known_to_uav else UNSEEN_COLOR
 
     @property
     def is_round(self) -> bool:
-        """Whether it is a ball or a post."""
         return bool(len(self.parts) == 1 and self.parts[0, outline.COUNT] == 1.0)
 
     @property
@@ -75,7 +73,6 @@ class Barrier:
 
     @property
     def top_m(self) -> float:
-        """Its height, m."""
         return float(self.parts[:, outline.TOP].max())
 
     @property
@@ -166,7 +163,6 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
 
 
 def stage_of(trace: Trace, scenario: Scenario) -> Stage:
-    """The stage of a run of a scenario."""
     return stage(scenario, np.concatenate([trace.body(robot) for robot in trace.robots]))
 
 

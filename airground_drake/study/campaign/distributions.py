@@ -138,7 +138,6 @@ def values_at(drawn: Mapping[str, Key], shares: Array) -> dict[str, Any]:
 
 
 def dimensions(drawn: Mapping[str, Key]) -> int:
-    """Number of shares of all keys."""
     return sum(key.size for key in drawn.values())
 
 

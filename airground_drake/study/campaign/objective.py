@@ -16,7 +16,6 @@ class Margin:
     claim: str
 
     def value(self, rows: Sequence[Row]) -> float:
-        """The least margin in the rows of a draw; infinite without a measurement."""
         return min((self._of(row) for row in rows if row["claim"] == self.claim), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
@@ -37,7 +36,6 @@ class Most:
     limit: float = math.inf
 
     def value(self, rows: Sequence[Row]) -> float:
-        """The negated largest value in the rows of a draw; infinite without a measurement."""
         values = [-self._of(row) for row in rows if row["ended"] == JUDGED]
         return min((value for value in values if not math.isnan(value)), default=math.inf)
 

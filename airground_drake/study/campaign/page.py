@@ -32,7 +32,6 @@ class Drawing(NamedTuple):
 
 
 def page(result: dict[str, Any], table: pd.DataFrame) -> str:
-    """Render the page."""
     template = _environment().get_template("campaign.html.j2")
     return template.render(
         found=result, told=told(result), engines=made_by(result["engines"]), separated=_separated(result),

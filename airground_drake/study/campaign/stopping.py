@@ -30,7 +30,6 @@ class Stopping:
 
     @classmethod
     def parse(cls, text: str, claims: Collection[str] = ()) -> Stopping:
-        """Parse a rule."""
         # claims: identifiers of the claims that are judged; empty: all about runs.
         match = _RULE.fullmatch(text)
         try:

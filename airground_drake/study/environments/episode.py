@@ -43,12 +43,10 @@ class ByDrake:
     """A run under way in Drake's Simulator, as `sim.batch.run.Going` is one in the compiled loop."""
 
     def __init__(self, recorder: Recorder, seed: int) -> None:
-        """Begin a run."""
         self._recorder, self._seed = recorder, seed
         self._simulator = recorder.begin(seed)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> NoReturn:
-        """Refuse, and say why."""
         wanted = "make a second environment and reset it with the same number: its episodes are the same"
         raise TypeError(f"this episode cannot be copied: its model is a Drake diagram; {wanted}")
 
@@ -74,7 +72,6 @@ class ByDrake:
         self._recorder.advance(self._simulator, until)
 
     def trace(self) -> Trace:
-        """The trace of the run until now."""
         return self._recorder.trace(self._simulator, self._seed)
 
 
@@ -107,7 +104,6 @@ class Stage:
         self.instant = Ticks(scenario.intervention.period_s, scenario.control.period_s).instant
 
     def begin(self, seed: int) -> Going | ByDrake:
-        """A run at its initial state."""
         return self._begin(seed)
 
 

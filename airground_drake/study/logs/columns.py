@@ -99,7 +99,6 @@ class Columns(NamedTuple):
 
 
 def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection[str]) -> Columns:
-    """The meaning of each column."""
     # chosen: names of columns by what they are, see `TARGETS`, with `{body}` for the name of a body; a unit may follow
     # what they are: `x_mm`.
     labels, mapped = _mapped(labels, chosen)
@@ -178,7 +177,6 @@ def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str]
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:
-    """Some names in a line."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 

@@ -202,7 +202,6 @@ def _both(
 
 
 def _pairs(scenario: Json, bodies: Mapping[str, Track]) -> list[Pair]:
-    """The pairs of bodies that are in the log; further UAVs are as the scenario's first one."""
     pairs, uavs = pairs_of(scenario), uavs_of(scenario)
     first = next(iter(uavs.values()))
     for name in bodies:
@@ -343,7 +342,6 @@ class _Law:
 
 
 def _signed(shape: Shape, apart: Array) -> Array:
-    """Signed distances, (K,), m."""
     return np.min([part.signed_m(apart) for part in shape.parts], axis=0)
 
 
@@ -450,7 +448,6 @@ def _longest(track: Track) -> float:
 
 
 def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
-    """All of it as strict JSON."""
     pairs = [
         {
             **pair._asdict(), "status": pair.status, "margin_m": pair.margin_m, "hypotheses": pair.hypotheses,

@@ -34,7 +34,6 @@ class Place(NamedTuple):
 
 
 def places(message: Any) -> Iterator[Place]:
-    """The positions in a message."""
     names, poses = _of(message, "name"), _of(message, "pose")
     if isinstance(names, list) and isinstance(poses, (list, np.ndarray)):  # Gazebo's model states
         for name, pose in zip(names, poses, strict=False):

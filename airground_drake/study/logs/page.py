@@ -38,7 +38,6 @@ _MAP_IN, _PANEL_IN, _HEIGHT_IN = 6.0, 7.5, 2.1
 def write(
     folder: Path, judged: Judged, tracks: Tracks, scenario: Scenario, errors_m: Mapping[str, float], logs: Sequence[str]
 ) -> list[Path]:
-    """Write the page and the replay to a folder."""
     pages = {}
     if judged.end_s - judged.begin_s <= LONGEST_REPLAY_S:
         pages[REPLAY] = replay_page(scene(judged, tracks, scenario, logs))

@@ -76,6 +76,5 @@ class Log:
     unusable: list[str] = field(default_factory=list)
 
     def add(self, other: Log) -> None:
-        """Take over what another log has."""
         self.streams += other.streams
         self.ignored += other.ignored

@@ -16,7 +16,6 @@ MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
 
 
 def headline(judged: Judged) -> str:
-    """The verdict in a line."""
     broken = [pair for pair in judged.pairs if pair.status == BROKEN]
     unsure = [pair for pair in judged.pairs if pair.status == OPEN]
     if broken:
@@ -32,7 +31,6 @@ def headline(judged: Judged) -> str:
 
 
 def coverage(judged: Judged) -> str:
-    """How much of the time is covered, in a sentence."""
     lasts = judged.end_s - judged.begin_s
     text = f"The log has {min(lasts, judged.duration_s):.6g} of the scenario's {judged.duration_s:g} s"
     if lasts > LONGER * judged.duration_s:
@@ -46,7 +44,6 @@ def coverage(judged: Judged) -> str:
 
 
 def least(pair: JudgedPair) -> str:
-    """The least distance of a pair, and when."""
     below = f", below it {spans(pair.below_s)}" if pair.below_s else ""
     error = f" ± {pair.error_m:g} m" if pair.error_m else ""
     what = "overlap by " if pair.least_m < 0.0 else ""
@@ -54,7 +51,6 @@ def least(pair: JudgedPair) -> str:
 
 
 def spans(those: Sequence[Span]) -> str:
-    """Stretches of time."""
     told = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those[:MOST_SPANS]]
     more = f" and {len(those) - MOST_SPANS} more" if len(those) > MOST_SPANS else ""
     return ", ".join(told) + more
@@ -128,7 +124,6 @@ def not_judged(judged: Judged) -> Iterator[str]:
 
 
 def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
-    """All that is printed."""
     yield headline(judged)
     for pair in [pair for pair in judged.pairs if pair.status == BROKEN][:MOST_NAMED]:
         yield f"  {pair.first}, {pair.second}: {doing(pair)}"
