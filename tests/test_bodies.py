@@ -20,9 +20,9 @@ from airground_drake.model.geometry.outline import GAP
 from airground_drake.report import attention, document
 from airground_drake.report.export import tables
 from airground_drake.report.figures.draw import draw
+from airground_drake.report.html import page
 from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
 from airground_drake.report.model import of
-from airground_drake.report.page import page
 from airground_drake.report.screen import first_screen
 from airground_drake.report.view.stage import stage
 from airground_drake.scenario.load import load, validated

@@ -67,8 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _all(spec: Spec, options: argparse.Namespace) -> int:
     from airground_drake.study.campaign import pool
-    from airground_drake.study.campaign.conduct import conduct
-    from airground_drake.study.campaign.stopping import Stopping
+    from airground_drake.study.campaign.conduct import Stopping, conduct
 
     stopping = Stopping.parse(options.stop_when, spec.claims) if options.stop_when else None
     folder = options.output or Path("campaigns") / spec.name

@@ -25,8 +25,7 @@ from airground_drake.scenario.shipped import argument
 from airground_drake.study.campaign.rows import COLUMNS
 
 if TYPE_CHECKING:
-    from airground_drake.study.campaign.falsification import Best, Search
-    from airground_drake.study.campaign.objective import Objective
+    from airground_drake.study.campaign.falsification import Best, Objective, Search
     from airground_drake.study.campaign.pool import Pool
     from airground_drake.study.campaign.spec import Spec
 
@@ -71,8 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(spec: Spec, options: argparse.Namespace) -> int:
     from airground_drake.study.campaign import pool
     from airground_drake.study.campaign.distributions import dimensions
-    from airground_drake.study.campaign.falsification import Search, falsify
-    from airground_drake.study.campaign.objective import Margin, Most
+    from airground_drake.study.campaign.falsification import Margin, Most, Search, falsify
     from airground_drake.study.campaign.search import Sampler
 
     limit = math.inf if options.limit is None else options.limit

@@ -14,7 +14,7 @@ from airground_drake.report import document, folder, junit, metrics, model
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.folder import PAGES
-from airground_drake.report.page import page
+from airground_drake.report.html import page
 from airground_drake.scenario import map_file, plugins
 from airground_drake.scenario.schema import MapCells, Scenario
 from airground_drake.sim import graphviz, trace

@@ -217,7 +217,7 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
     """The files that follow from report.json and the traces: pages, and what `airground prove` has added."""
     from airground_drake.report import junit, model, proved
     from airground_drake.report.figures.draw import draw
-    from airground_drake.report.page import page
+    from airground_drake.report.html import page
     from airground_drake.verify.proofs.compare import broken_rules
 
     made = model.of(report)

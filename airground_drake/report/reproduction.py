@@ -13,7 +13,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
-from airground_drake.report.quantities import YES_NO
+from airground_drake.report.sentences import YES_NO
 from airground_drake.scenario.schema import Reproduction, Scenario
 from airground_drake.sim.collisions import first_collisions
 from airground_drake.sim.trace import Trace

@@ -503,7 +503,7 @@ LOGS = (
     ),
     Mutant(
         "log: a goal is where a robot is",
-        "study/logs/names.py",
+        "study/logs/stream.py",
         "is_elsewhere",
         "return not ELSEWHERE.isdisjoint(words)",
         "return False",

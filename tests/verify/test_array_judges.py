@@ -11,7 +11,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.shipped import shipped_files
 from airground_drake.sim.batch.loop import Log
 from airground_drake.sim.batch.run import Batch, LeftToDrakeError
-from airground_drake.study.campaign.screening import happened, happened_in
+from airground_drake.study.campaign.work import happened, happened_in
 from airground_drake.study.testing.strategies import scenarios
 from airground_drake.verify import judge
 from airground_drake.verify.array_judges import SAME, SCREENED, ArrayJudges, NoScreenError

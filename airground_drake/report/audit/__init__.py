@@ -7,8 +7,8 @@ scenarios or on formulas alone: `python -m airground_drake.report audit`.
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from airground_drake.report.audit.item import typeset
 from airground_drake.report.audit.runs import findings
-from airground_drake.report.audit.typeset import typeset
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import Verdict

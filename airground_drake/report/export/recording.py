@@ -10,8 +10,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ExportError
 from airground_drake.report.view.geometry import Mesh, prisms
-from airground_drake.report.view.looks import OBSTACLE_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR, rgb
-from airground_drake.report.view.stage import Barrier, Robot, Stage, stage_of, states
+from airground_drake.report.view.stage import (
+    OBSTACLE_COLOR,
+    SAFE_COLOR,
+    STATE_COLORS,
+    UAV_COLOR,
+    UNSEEN_COLOR,
+    Barrier,
+    Robot,
+    Stage,
+    rgb,
+    stage_of,
+    states,
+)
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 

@@ -9,16 +9,21 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ReplayError
 from airground_drake.report.view.geometry import camera, grid, prisms
-from airground_drake.report.view.looks import (
+from airground_drake.report.view.stage import (
+    FINE,
     OBSTACLE_COLOR,
     PATH_COLOR,
     SAFE_COLOR,
     STATE_COLORS,
+    STATES,
+    TRIGGERED,
     UAV_COLOR,
     UNSEEN_COLOR,
+    Barrier,
+    Robot,
+    Stage,
     rgb,
 )
-from airground_drake.report.view.stage import FINE, STATES, TRIGGERED, Barrier, Robot, Stage
 
 ELEVATION = np.radians(58.0)
 # Tops of safe zones that overlap differ by up to this share of their height: the higher one hides the lower one.

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.study.environments.extra import needed
+from airground_drake.study.environments.sources import needed
 
 with needed():
     import gymnasium

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.study.environments.extra import needed
+from airground_drake.study.environments.sources import needed
 
 with needed():
     from gymnasium.spaces import Box

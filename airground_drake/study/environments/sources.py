@@ -2,7 +2,8 @@
 
 import copy
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from numbers import Integral
 from typing import Any, Self
@@ -170,3 +171,13 @@ def _chosen(scenario: Scenario, run: str | None) -> str:
     if run not in having:
         raise UnknownNameError("run with interventions", run, having)
     return run
+
+
+@contextmanager
+def needed() -> Iterator[None]:
+    """In the body, a package that is missing is named with the extra that brings it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        hint = f"environments need the package {error.name}: pip install 'airground_drake[gym]'"
+        raise ModuleNotFoundError(hint, name=error.name) from None

@@ -7,8 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from airground_drake.base.errors import LogError
-from airground_drake.study.logs.names import is_elsewhere, segments
-from airground_drake.study.logs.stream import PER_M, PER_S
+from airground_drake.study.logs.stream import PER_M, PER_S, is_elsewhere, segments
 
 # Other words for units.
 WORDS = {

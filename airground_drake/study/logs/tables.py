@@ -14,8 +14,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import LogError
 from airground_drake.study.logs import text
 from airground_drake.study.logs.columns import WORDS, Columns, Place, Time, clock_of, columns, counts_frames, listed
-from airground_drake.study.logs.names import body_of, renamed
-from airground_drake.study.logs.stream import PER_M, Log, Stream, Whole
+from airground_drake.study.logs.stream import PER_M, Log, Stream, Whole, body_of, renamed
 
 TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]  # columns of a file in TUM's format, which has no header
 # First columns of what `ros2 topic echo --csv` prints of a pose; of odometry, the other frame stands before x.

@@ -13,8 +13,19 @@ from airground_drake.base.errors import LogError, one_line
 from airground_drake.check.files import Json
 from airground_drake.check.limits import LARGEST
 from airground_drake.check.scenario import expected_m_s, robots_of, uavs_of
-from airground_drake.study.logs import axes, names, units
-from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, RECEIPT, Log, Stream, Whole
+from airground_drake.study.logs import axes, units
+from airground_drake.study.logs.stream import (
+    OF_MESSAGES,
+    PER_M,
+    RECEIPT,
+    Log,
+    Stream,
+    Whole,
+    body_of,
+    is_elsewhere,
+    renamed,
+    segments,
+)
 
 # A body was not recorded where two of its samples are farther apart than this multiple of the usual time between.
 GAP = 2.5
@@ -220,15 +231,15 @@ def _exist(rename: Mapping[str, str], log: Log, bodies: Collection[str]) -> None
 
 def _body_of(stream: Stream, bodies: Collection[str], rename: Mapping[str, str]) -> tuple[str, int]:
     """The body of a stream, or '', and how near its name is: 0 renamed, 1 `OF_BODY`, 2 equal, 3 part of it."""
-    if body := names.renamed((stream.name, stream.child, stream.label), rename):
+    if body := renamed((stream.name, stream.child, stream.label), rename):
         return body, 0
     for name in filter(None, (stream.name, stream.child)):
         for rank, plain in ((1, name.removesuffix(OF_BODY)), (2, name.strip("/"))):
             if plain in bodies and (rank == 2 or plain != name):
                 return plain, rank
-        if names.is_elsewhere(name, bodies):
+        if is_elsewhere(name, bodies):
             break
-        if body := names.body_of(name, bodies, is_file=stream.is_file):
+        if body := body_of(name, bodies, is_file=stream.is_file):
             return body, 3
     return "", 3
 
@@ -263,7 +274,7 @@ def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
     if len({*stated.values()}) > 1:
         wanted = "wanted: positions in one frame, such as map or world; or --frame for each name of that one frame"
         raise LogError(one_line(f"positions are in different frames: {several}; {wanted}"))
-    if len(frames) > 1 and stated and names.segments(next(iter(stated.values())))[-1] == "odom":
+    if len(frames) > 1 and stated and segments(next(iter(stated.values())))[-1] == "odom":
         wanted = "wanted: positions in one frame, such as map or world; or --frame odom if this is one for all"
         raise LogError(one_line(f"odometry is in a frame of each robot's own, though both may be called odom: "
                                 f"{several}; {wanted}"))  # fmt: skip

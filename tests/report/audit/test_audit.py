@@ -12,7 +12,7 @@ import pytest
 
 from airground_drake.model.trigger import bayes
 from airground_drake.report.audit import companions, formulas, literal, readings, thresholds
-from airground_drake.report.audit.typeset import typeset
+from airground_drake.report.audit.item import typeset
 from airground_drake.scenario.load import load
 from airground_drake.ugv.solution import ConstantPlans
 from airground_drake.verify import Finding, cache_folder, judge_model
