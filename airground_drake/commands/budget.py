@@ -7,9 +7,8 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from airground_drake.base import files
 from airground_drake.base.parallel import processors
-from airground_drake.base.usage import output_file, refuse
+from airground_drake.base.usage import refuse
 from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
@@ -28,7 +27,6 @@ def parser() -> Parser:
         {
             "scenario": None,
             "run": "with --vary (default: all runs)",
-            "-o --output": option("draw it, too, as SVG", "FILE", output_file),
             "--json": "print all of it as JSON",
             "--vary": option("a key, such as channel.delay_s=0,0.1,0.3; without values some usual ones", "KEY=VALUES"),
             "--jobs": None,
@@ -48,10 +46,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.run is not None:
         return refuse(f"run {options.run!r}: a budget is the same for all runs; wanted: --vary, or no run")
     groups = alike(budget(scenario))
-    if options.output is not None:
-        from airground_drake.report.view.budget import drawn
-
-        files.write_text(options.output, drawn([(_about(group), group[0]) for group in groups]))
     if options.json:
         print(json.dumps([_entry(group) for group in groups], indent=1))
         return 0
@@ -73,10 +67,6 @@ def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
     key, _, given = options.vary.partition("=")
     values = parsed(f"[{given}]", "--vary").data or usual_values(key)
     rows = vary(scenario, key, values, [options.run] if options.run else (), options.jobs or processors())
-    if options.output is not None:
-        from airground_drake.report.view.budget import drawn_by_value
-
-        files.write_text(options.output, drawn_by_value(rows, key))
     if options.json:
         print(json.dumps(rows.astype(object).where(rows.notna(), None).to_dict("records"), indent=1))
         return 0

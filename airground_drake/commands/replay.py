@@ -19,10 +19,9 @@ def parser() -> Parser:
         "run": "default: all runs, a file each",
         "-o --output": {"help": "folder for the pages, or a name.html for RUN (default: .)", "metavar": "PLACE",
                         "default": Path()},
-        "--live": "write nothing; serve the pages on this machine",
         "--video": option("write RUN as a video instead: .webp or .mp4", "FILE", output_file),
         "--speed": option(f"with --video: its speed (default: {SPEED:g})", "X", between(SLOWEST, FASTEST)),
-    }, exclusive=("-o --output", "--live", "--video"))  # fmt: skip
+    }, exclusive=("-o --output", "--video"))  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,14 +30,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse("--video needs a RUN")
     if options.speed and not options.video:
         return refuse("--speed needs --video")
-    from airground_drake.report.replay import live, video
+    from airground_drake.report.replay import video
     from airground_drake.report.replay.page import page
     from airground_drake.report.replay.scene import scene
 
     folder, runs = options.folder, runs_of(options.folder, options.run)
-    if options.live:
-        live.serve(runs, lambda name: page(scene(*trace_of(folder, name))))
-    elif options.video:
+    if options.video:
         outside_reports(options.video.parent, "the video")
         video.write(scene(*trace_of(folder, options.run)), options.video, options.speed or SPEED)
         print(one_line(str(options.video)))
