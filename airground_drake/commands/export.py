@@ -31,11 +31,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _written(report: Path, run: str, kind: str, output: Path) -> Iterator[Path]:
-    from airground_drake.report.export import recording, tables
+    from airground_drake.report.export import recording
 
     saved, scenario = trace_of(report, run)
     if kind == "csv":
-        yield from tables.write(saved, output)
+        yield from recording.write(saved, output)
     else:
         path = output / f"{saved.run}.mcap"
         files.write_bytes(path, recording.recorded(saved, scenario))

@@ -34,7 +34,6 @@ def item(
 
 
 def status(proofs: Mapping[str, Finding], claim: str) -> str:
-    """Status of a claim, 'not_run' if it is not there."""
     return proofs[claim].status if claim in proofs else "not_run"
 
 

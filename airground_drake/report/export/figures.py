@@ -101,7 +101,6 @@ def escaped(text: str) -> str:
 
 
 def verdicts(report: Report) -> str:
-    """A table with a row per claim: its verdict about the model, or about each run."""
     # "not tested" stands for a verdict that nothing could have refuted.
     statuses_by_claim: dict[str, dict[str, str]] = {}
     for claim in report.claims:
@@ -114,7 +113,6 @@ def verdicts(report: Report) -> str:
 
 
 def reproduction(report: Report) -> str:
-    """A table with a row per result of the paper: its value there, here, and whether it was reproduced."""
     rows = [
         [row.id, row.quantity, told(row.paper, row.unit), told(row.ours, row.unit), row.status.replace("_", " ")]
         for row in report.reproduction

@@ -24,7 +24,6 @@ MARKERS = "os^Dv"
 
 
 def draw(items: Sequence[Mapping[str, Any]]) -> list[Figure]:
-    """A figure beside each finding that has a picture of its own."""
     with canvas.style():
         return [of_finding(PICTURES[item["id"]](item), item["id"]) for item in items if item["id"] in PICTURES]
 
