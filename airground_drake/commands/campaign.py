@@ -85,7 +85,6 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
 
 
 def _only(spec: Spec, options: argparse.Namespace) -> int:
-    """One draw alone: its verdicts, and its scenario as a file that `report` takes."""
     from airground_drake.scenario.document import text_of
     from airground_drake.scenario.load import resolved
     from airground_drake.study.campaign.evidence import evidence
@@ -123,7 +122,6 @@ def _code(result: dict[str, Any]) -> int:
 
 
 def _undecided(result: dict[str, Any]) -> list[str]:
-    """The reasons of exit code 3, in words."""
     draws, ended = result["draws"], result["ended"]
     lines = [f"{ended[name]} of {draws} draws {name}" for name in UNFINISHED if name in ended]
     for claim in result["claims"]:

@@ -42,8 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     else:
         for name, path in _paths(options.output, runs).items():
             outside_reports(path.parent, "the pages")
-            mark = _mark(folder, name)
-            if path.exists() and not _has(path, mark):
+            # the last line of a run's page; it stays the same when the report is made again
+            mark = f"<!-- airground replay {files.sha256(f'{folder.resolve()}/{name}'.encode())} -->"
+            if path.exists() and not (path.is_file() and mark.encode() in files.read_bytes(path)[-2 * len(mark) :]):
                 why = "is not a replay of this run of"
                 raise FolderError(one_line(f"{path} {why} {folder}; it is left alone; name another place, with -o"))
             files.write_text(path, f"{page(scene(*trace_of(folder, name)))}{mark}\n")
@@ -58,15 +59,3 @@ def _paths(output: Path, runs: Sequence[str]) -> dict[str, Path]:
     if len(runs) > 1:
         raise FolderError(one_line(f"{output} is one file for the runs {', '.join(runs)}; name a RUN, or a folder"))
     return {runs[0]: output}
-
-
-def _mark(folder: Path, run: str) -> str:
-    """Return the last line of a run's page. It stays the same when the report is made again."""
-    return f"<!-- airground replay {files.sha256(f'{folder.resolve()}/{run}'.encode())} -->"
-
-
-def _has(path: Path, mark: str) -> bool:
-    """Whether a path is a plain file that ends with a mark."""
-    if not path.is_file():
-        return False
-    return mark.encode() in files.read_bytes(path)[-2 * len(mark) :]

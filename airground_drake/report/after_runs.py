@@ -140,7 +140,6 @@ def versions() -> dict[str, str]:
 
 
 def _solver(scenario: Scenario, daqp: str) -> str:
-    """The solver of (26) under method (c)."""
     route, solver = scenario.gatekeeper.route, scenario.gatekeeper.solver
     if route != "mixed_integer":
         return f"that of the route {route}"

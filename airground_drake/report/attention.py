@@ -7,7 +7,7 @@ from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import PASSING, UNDECIDED, outcome
 from airground_drake.report.model import Claim, Report, Run
 from airground_drake.report.outcomes import distance, named
-from airground_drake.report.sentences import MAX_NAMES, counted, grouped, joined
+from airground_drake.report.sentences import MAX_NAMES, counted, grouped, joined, some
 from airground_drake.scenario.validate import preset_s
 from airground_drake.ugv.reasons import refusal
 
@@ -83,10 +83,7 @@ def beforehand(report: Report) -> Iterator[Item]:
     longer = {name: preset_s(ugv.preset.waypoints_m, ugv.preset.speed_m_s) for name, ugv in scenario.ugvs.items()}
     longer = {name: time_s for name, time_s in longer.items() if time_s > scenario.duration_s}
     if longer:
-        names = list(longer)
-        who = ", ".join(names[:MAX_NAMES])
-        if len(names) > MAX_NAMES:
-            who += f" and {len(names) - MAX_NAMES} more"
+        who = some([*longer], MAX_NAMES)
         ends = f"duration_s = {scenario.duration_s:g} ends the runs before the presets of {who} do"
         yield Item("inconclusive", f"{ends} ({max(longer.values()):.3g} s): they cannot be expected to arrive")
 

@@ -149,7 +149,14 @@ def _shown(claim: Claim) -> str:
 
 
 def stylesheet() -> str:
-    return _template(STYLE) + _in_the_dark()
+    # The last rules recolour drawings on a dark page; they name no ancestor, which would not match inside <use>.
+    dark = "\n".join(
+        f'[{name}="{light}"] {{ {name}: {dark}; }}'
+        for light, dark in canvas.DARK.items()
+        for name in ("fill", "stroke")
+    )
+    text = f"svg text:not([fill]) {{ fill: {canvas.DARK['black']}; }}"
+    return f"{_template(STYLE)}@media screen and (prefers-color-scheme: dark) {{\n{dark}\n{text}\n}}\n"
 
 
 def _template(name: str) -> str:
@@ -167,17 +174,6 @@ def security_policy(style: str, script: str = "") -> str:
 def digest(text: str) -> str:
     """A script or style sheet as a content security policy names it."""
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
-
-
-def _in_the_dark() -> str:
-    """Rules that recolour the drawings on a dark page; they name no ancestor, which would not match inside <use>."""
-    rules = "\n".join(
-        f'[{name}="{light}"] {{ {name}: {dark}; }}'
-        for light, dark in canvas.DARK.items()
-        for name in ("fill", "stroke")
-    )
-    text = f"svg text:not([fill]) {{ fill: {canvas.DARK['black']}; }}"
-    return f"@media screen and (prefers-color-scheme: dark) {{\n{rules}\n{text}\n}}\n"
 
 
 def evidence_tables(claim: Claim) -> list[Table]:
@@ -231,7 +227,6 @@ def _together(members: Sequence[Claim]) -> list[tuple[Claim, str]]:
 
 
 def _assumptions(claims: Sequence[Claim]) -> dict[str, list[str]]:
-    """Assumptions and the claims that make them; those of many claims first."""
     resting = grouped(dict.fromkeys((assumed, claim.id) for claim in claims for assumed in claim.assumptions))
     return dict(sorted(resting.items(), key=lambda item: -len(item[1])))
 

@@ -42,7 +42,6 @@ NO_GAP = 1e-9  # a relative optimality gap up to this is a rounding error
 
 
 def of_run(trace: Trace) -> dict[str, Any]:
-    """Metrics of one run, as `model.Metrics` has them."""
     method = method_of(trace.meta["method"])
     wall_s = trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
@@ -187,7 +186,6 @@ def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
 
 
 def outcome(trace: Trace) -> dict[str, Any]:
-    """What came of a run, as `model.Seed` has it."""
     pairs = pairs_of(trace)
     bounds = apart_of(trace) - [pair.safe_m for pair in pairs]
     (k,) = least_of(bounds, 1, lambda k: least_gap(trace, pairs[k]).margin_m)
@@ -239,7 +237,6 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
 
 
 def _refusals(trace: Trace) -> dict[str, dict[str, int]]:
-    """How many proposals each robot refused at its first answer, by reason."""
     first = trace.decisions.drop_duplicates("number")
     refused = first[first["decision"] == "refuse"]
     return {

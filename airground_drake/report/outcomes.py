@@ -52,7 +52,6 @@ class Near(NamedTuple):
 
 
 def pairs(run: Run) -> Iterator[Near]:
-    """The smallest distances of a run; two robots may be there twice."""
     for nearest in (run.metrics.min_distance_m, run.metrics.min_robot_distance_m):
         for robot, others in nearest.items():
             yield from (Near.between(robot, other, at) for other, at in others.items())

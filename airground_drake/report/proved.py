@@ -23,7 +23,6 @@ _PLACES = re.compile(r"<!--Coq on (\w+)-->.*?<!--end-->", re.DOTALL)
 
 
 def place(claim: Claim) -> Markup:
-    """The place of Coq's line about a claim; '' if Coq is not asked about that claim."""
     return _place(claim.run) if claim.id == DISTANCES else Markup("")
 
 

@@ -193,7 +193,6 @@ def _taken(line: Line, why: str, applies: bool) -> Line:
 
 
 def _map(folder: Path, scenario: Any) -> Iterator[Line]:
-    """The cells of a map, made again from the copies of its files."""
     from airground_drake.report.folder import of_map
     from airground_drake.scenario import map_file
 

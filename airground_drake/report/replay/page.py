@@ -52,7 +52,6 @@ _LOOKS = {
 
 
 def _data(scene: Scene) -> dict[str, Any]:
-    """Data for the page's script: the names to show, and their places in Meshcat's tree."""
     return {
         "title": f"{scene.scenario.name}, {'run' if scene.has_states else 'log'} {scene.run}",
         "end_s": float(scene.times_s[-1]),

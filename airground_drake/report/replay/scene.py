@@ -107,7 +107,6 @@ def frame_times(t: Array) -> Array:
 
 
 def sent(trace: Trace) -> tuple[Sent, ...]:
-    """All proposals of a run, by time."""
     return tuple(
         Sent(became["robot"], became["policy"], proposal_of(trace, became["number"]).positions_m, tuple(_spans(became)))
         for became in interventions(trace)

@@ -149,15 +149,11 @@ def label_right(axes: Axes, labels: Sequence[tuple[float, str, str]]) -> None:
     """Labels (value, text, colour) right of the axes, at their values if there is room."""
     bottom, top = axes.get_ylim()
     order = sorted(range(len(labels)), key=lambda k: labels[k][0])
-    places = spread([(labels[k][0] - bottom) / (top - bottom) for k in order], line_gap(axes))
+    line = 1.25 * _FONT_PT / _POINTS_PER_INCH / size_in(axes)[1]  # between lines of text, as a share of the height
+    places = spread([(labels[k][0] - bottom) / (top - bottom) for k in order], line)
     for k, place in zip(order, places, strict=True):
         _, text, color = labels[k]
         axes.text(1.015, place, text, color=color, transform=axes.transAxes, va="center", ha="left", clip_on=False)
-
-
-def line_gap(axes: Axes) -> float:
-    """Distance between lines of text, as a share of the axes' height."""
-    return 1.25 * _FONT_PT / _POINTS_PER_INCH / size_in(axes)[1]
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:

@@ -220,5 +220,4 @@ def _changed(path: Path, index: object) -> FolderError:
 
 
 def table_of(rows: Sequence[Row]) -> pd.DataFrame:
-    """Rows as a table with the columns and types of `COLUMNS`."""
     return pd.DataFrame(list(rows), columns=list(COLUMNS)).astype(COLUMNS)

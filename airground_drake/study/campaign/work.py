@@ -247,16 +247,11 @@ def happened(loop: Batch, made: Going) -> Row:
         arrivals += [] if row is None else [float(log.t[row])]
     # Each row has the state of the interval before it.
     intervened_s = np.diff(log.t) @ (log.executing[1:] >= 0.0)
-    return {
+    return _times_of(times, arrivals, intervened_s.tolist()) | {
         "ugvs": len(world.names("ugv")),
-        "triggers": len(times),
-        "first_trigger_s": min(times, default=float("nan")),
-        "arrived": len(arrivals),
-        "arrival_s": max(arrivals, default=float("nan")),
         "decisions": len(made.decided),
         "accepted": sum(decision.accepted for decision in made.decided),
         "faults": sum(bool(asking.what) for asking in made.memory.asked),
-        "intervened_s": float(intervened_s.max(initial=0.0)),
     }
 
 
@@ -265,14 +260,19 @@ def happened_in(trace: Trace) -> Row:
     triggered = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
     arrivals = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
     intervened_s = [float(np.diff(trace.t) @ (trace.executing(ugv)[1:] >= 0)) for ugv in trace.ugvs]
-    return {
+    return _times_of(triggered, arrivals, intervened_s) | {
         "ugvs": len(trace.ugvs),
-        "triggers": len(triggered),
-        "first_trigger_s": min(triggered, default=float("nan")),
-        "arrived": len(arrivals),
-        "arrival_s": max(arrivals, default=float("nan")),
         "decisions": len(trace.decisions),
         "accepted": int((trace.decisions["decision"] == "accept").sum()),
         "faults": len(trace.meta["faults"]),
+    }
+
+
+def _times_of(triggers: Sequence[float], arrivals: Sequence[float], intervened_s: Sequence[float]) -> Row:
+    return {
+        "triggers": len(triggers),
+        "first_trigger_s": min(triggers, default=float("nan")),
+        "arrived": len(arrivals),
+        "arrival_s": max(arrivals, default=float("nan")),
         "intervened_s": max(intervened_s, default=0.0),
     }

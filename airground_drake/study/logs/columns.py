@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from airground_drake.base.errors import LogError
+from airground_drake.report.sentences import some
 from airground_drake.study.logs.stream import PER_M, PER_S, is_elsewhere, segments
 
 # Other words for units.
@@ -56,7 +57,6 @@ class Time(NamedTuple):
     owner: str
 
     def is_of(self, place: Place) -> bool:
-        """Whether it may be the clock of a place."""
         after = place.name[len(self.owner) :]
         return not self.owner or (place.name.startswith(self.owner) and not after[:1].isalnum())
 
@@ -176,8 +176,7 @@ def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str]
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    return some(names, most)
 
 
 def _last(label: str) -> str:
@@ -185,7 +184,6 @@ def _last(label: str) -> str:
 
 
 def _named(labels: Sequence[str], names: Sequence[str]) -> int | None:
-    """The first column with the first of some names."""
     last = [_last(label) for label in labels]
     return next((last.index(name) for name in names if name in last), None)
 

@@ -122,7 +122,6 @@ def known(scenario: Json, choice: Choice, others: Sequence[str] = ()) -> None:
 
 
 def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
-    """The tracks of the bodies of a scenario."""
     bodies = [name for name in bodies_of(scenario, choice.uavs) if name not in choice.without]
     streams, ignored = _assigned(log, bodies, choice)
     _in_one_frame({name: stream.frame for name, stream in streams.items()}, choice.frames)
@@ -140,7 +139,8 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
         if name not in streams and name not in choice.without:
             for stream in log.streams:
                 if stream.skipped and not len(stream.whole) and _body_of(stream, bodies, choice.rename)[0] == name:
-                    raise LogError(one_line(f"{name} has no usable rows: {_skipped(stream)}; wanted: {_USABLE}"))
+                    unusable = ", ".join(f"{n} with {why}{_where(stream, why)}" for why, n in stream.skipped.items())
+                    raise LogError(one_line(f"{name} has no usable rows: {unusable}; wanted: {_USABLE}"))
             raise LogError(_not_there(name, log, choice))
     if len(clocks := {stream.clock for stream in streams.values() if stream.clock in OF_MESSAGES}) > 1:
         late = ", ".join(name for name, stream in streams.items() if stream.clock == RECEIPT)
@@ -251,7 +251,6 @@ def _links(streams: list[Stream]) -> list[Stream]:
 
 
 def _merged(streams: list[Stream]) -> Stream:
-    """One stream of several files."""
     first = streams[0]
     for other in streams[1:]:
         if (other.time_unit, other.length_unit, other.clock) != (first.time_unit, first.length_unit, first.clock):
@@ -278,11 +277,6 @@ def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
         wanted = "wanted: positions in one frame, such as map or world; or --frame odom if this is one for all"
         raise LogError(one_line(f"odometry is in a frame of each robot's own, though both may be called odom: "
                                 f"{several}; {wanted}"))  # fmt: skip
-
-
-def _skipped(stream: Stream) -> str:
-    """Rows of a stream that cannot be used, in words."""
-    return ", ".join(f"{count} with {reason}{_where(stream, reason)}" for reason, count in stream.skipped.items())
 
 
 def _where(stream: Stream, reason: str) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from airground_drake.check.rules import SMALL
+from airground_drake.report.sentences import some
 from airground_drake.study.logs.judging import BROKEN, KEPT, NOT_JUDGED, OPEN, Judged, JudgedPair
 from airground_drake.study.logs.tracks import Span, Tracks
 
@@ -51,13 +52,11 @@ def least(pair: JudgedPair) -> str:
 
 
 def spans(those: Sequence[Span]) -> str:
-    told = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those[:MOST_SPANS]]
-    more = f" and {len(those) - MOST_SPANS} more" if len(those) > MOST_SPANS else ""
-    return ", ".join(told) + more
+    told = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those]
+    return some(told, MOST_SPANS)
 
 
 def doing(pair: JudgedPair) -> str:
-    """Who approached whom before the least distance."""
     told = []
     for name, came in sorted(pair.came_m.items(), key=lambda item: -item[1]):
         if came >= LEAST_TOLD_M:
@@ -70,7 +69,6 @@ def doing(pair: JudgedPair) -> str:
 
 
 def law(pair: JudgedPair) -> str:
-    """What the theorem says of a pair."""
     if pair.missed_m <= SMALL:
         held = f"the law held in all {pair.intervals} intervals"
     else:
@@ -92,7 +90,6 @@ def law(pair: JudgedPair) -> str:
 
 
 def remarks(judged: Judged) -> Iterator[str]:
-    """What does not fit the scenario, although it does not decide about a distance."""
     for name, (speed, limit) in judged.speeds_m_s.items():
         if speed > FASTER * limit:
             yield f"{name} moves at up to {speed:.3g} m/s, above its limit of {limit:g} m/s"
@@ -106,7 +103,6 @@ def remarks(judged: Judged) -> Iterator[str]:
 
 
 def source(name: str, tracks: Tracks) -> str:
-    """Where the positions of a body are from."""
     track = tracks.bodies[name]
     frame = f" in frame {track.told['frame']}" if track.told.get("frame") else ""
     clock = f", by {track.told['clock']}" if track.told.get("clock") else ""
@@ -116,7 +112,6 @@ def source(name: str, tracks: Tracks) -> str:
 
 
 def not_judged(judged: Judged) -> Iterator[str]:
-    """What the verdict does not say."""
     first, *others = NOT_JUDGED
     longest = f"the longest interval is {judged.longest_s:.3g} s, in which a robot"
     yield f"{first}; {longest} at its speed limit can leave the line by {judged.stray_m:.2g} m"

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -60,18 +58,11 @@ def airground_trace(tmp_path_factory: pytest.TempPathFactory) -> Simulations:
         key = digest(wanted, run)
         if key not in read:
             place = folder / key
-            with _alone(folder / f"{key}.lock"):
+            with (folder / f"{key}.lock").open("w") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)  # other workers wait
                 if not (place / "meta.json").exists():  # which is written last
                     trace.save(simulate(wanted, run), place)
             read[key] = trace.load(place)
         return read[key]
 
     return get
-
-
-@contextmanager
-def _alone(lock: Path) -> Iterator[None]:
-    """At most one process at a time holds the same lock."""
-    with lock.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

@@ -11,7 +11,6 @@ from airground_drake.sim.tables import SCHEMA
 
 
 def chosen(scenario: str | Path | Scenario, overrides: Overrides = ()) -> Scenario:
-    """A scenario by name or path, or a copy of the given one, with overrides."""
     return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)
 
 
