@@ -9,10 +9,9 @@ from airground_drake.base.statuses import PASSING
 from airground_drake.report.attention import in_words, place_of
 from airground_drake.report.model import Claim
 from airground_drake.report.sentences import told as value_of
-from airground_drake.scenario.load import Overrides
+from airground_drake.scenario.load import Overrides, load, validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
-from airground_drake.study.testing.scenario import chosen
 from airground_drake.verify.claim import TraceClaim, Verdict
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.judging import judge, judge_model
@@ -92,6 +91,10 @@ def assert_proved(
     __tracebackhide__ = True
     wanted = chosen(scenario, set)
     _require(judge_model(wanted, kept=kept, claims=claims or None), f"for {wanted.name}", exercised=False)
+
+
+def chosen(scenario: str | Path | Scenario, overrides: Overrides) -> Scenario:
+    return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)
 
 
 def _require(verdicts: Iterable[Verdict], place: str, *, exercised: bool) -> None:
