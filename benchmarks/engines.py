@@ -31,9 +31,8 @@ from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.scenario.load import load
 from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.sim.simulation import Recorder
-from airground_drake.study.campaign.screening import happened, screened
 from airground_drake.study.campaign.spec import load_spec
-from airground_drake.study.campaign.work import rows_of
+from airground_drake.study.campaign.work import happened, rows_of, screened
 from airground_drake.verify import Verdict, judge
 from airground_drake.verify.array_judges import SCREENED
 

@@ -9,6 +9,7 @@ import argparse
 import html
 import inspect
 import re
+import runpy
 import textwrap
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +31,6 @@ from airground_drake.base.registry import (
     parameters,
 )
 from airground_drake.commands import COMMANDS
-from airground_drake.report.audit.equations import DEVIATIONS, Kind
 from airground_drake.report.view.plane import thumbnail_of
 from airground_drake.scenario import json_schema
 from airground_drake.scenario.keys import sections
@@ -44,6 +44,8 @@ DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
 WIDTH = 120
 
+_PAPER = runpy.run_path(str(DOCS / "equations.py"))
+DEVIATIONS, KINDS = _PAPER["DEVIATIONS"], get_args(_PAPER["Kind"])
 EQUATIONS = {row.place[1:-1] for row in DEVIATIONS if row.place.startswith("(")}
 """Numbers of the paper's equations."""
 
@@ -142,7 +144,7 @@ def equations() -> str:
         for number in _numbers(claim.equations):
             claimed[f"({number})"].append(f"[{name}](claims.md#{name.lower()})")
     lines = []
-    for kind in get_args(Kind):
+    for kind in KINDS:
         places = "; ".join(row.place for row in DEVIATIONS if row.kind == kind)
         lines += [f"- **{kind}**: {places}."]
     for row in DEVIATIONS:

@@ -18,11 +18,11 @@ from airground_drake.base.errors import TraceError
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.outline import GAP
 from airground_drake.report import attention, document
-from airground_drake.report.export import tables
+from airground_drake.report.export import recording
 from airground_drake.report.figures.draw import draw
+from airground_drake.report.html import page
 from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
 from airground_drake.report.model import of
-from airground_drake.report.page import page
 from airground_drake.report.screen import first_screen
 from airground_drake.report.view.stage import stage
 from airground_drake.scenario.load import load, validated
@@ -103,7 +103,9 @@ def test_a_pair_has_one_distance_wherever_users_see_it(ends_at: float, gap_m: fl
     )
     listed = next(each for each in evidence["SAFE-TRACE"]["pairs"] if pair.items() <= each.items())
     metric = report["runs"]["b"]["metrics"]["min_distance_m"]["ugv1"]["rock"]
-    exported = pd.read_csv([*tables.write(trace, tmp_path)][-1]).query("first == 'ugv1' and second == 'rock'").iloc[0]
+    exported = (
+        pd.read_csv([*recording.write(trace, tmp_path)][-1]).query("first == 'ugv1' and second == 'rock'").iloc[0]
+    )
     (exact,) = (one for one in too_near(recorded(trace)) if one.demand.second == "rock" and one.demand.first == "ugv1")
     for distance, required in (
         (listed["min_distance_m"], listed["safe_distance_m"]),

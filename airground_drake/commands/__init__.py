@@ -52,7 +52,6 @@ COMMANDS: dict[str, Command] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command."""
     # Returns the command's exit code; 2 if the command is unknown or refuses, 4 if a simulation stops.
     given = list(sys.argv[1:] if arguments is None else arguments)
     options, unknown = _parser().parse_known_args(given[:1])
@@ -92,6 +91,5 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def entry() -> None:
-    """Console script."""
     interruption.begin()  # before the imports, which take seconds
     interruption.run(main)

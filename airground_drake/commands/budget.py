@@ -7,15 +7,24 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from airground_drake.base import files
+from airground_drake.base.errors import ScenarioError
 from airground_drake.base.parallel import processors
-from airground_drake.base.usage import output_file, refuse
+from airground_drake.base.usage import refuse
+from airground_drake.report.rules import DISTANCES
+from airground_drake.report.sentences import some
 from airground_drake.scenario.options import Parser, option, parser_of
+from airground_drake.study.campaign.rows import JUDGED
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from airground_drake.scenario.budget import PairBudget
     from airground_drake.scenario.schema import Scenario
 
+# Values of a key that is given without any, by its unit; the last entry is for shares.
+USUAL = {"_s": (0.0, 0.1, 0.3, 1.0), "_m": (0.0, 0.02, 0.05, 0.1), "": (0.0, 0.1, 0.5)}
+PROMISED, LAW = "promised_m", "law_m"  # what is told of a kind of pair
+MEANING = "metres, by kind of pair: the distance promised between surfaces -> the distance that the law keeps"
 MOST_NAMED = 6  # bodies that are named in a line at most
 
 
@@ -28,7 +37,6 @@ def parser() -> Parser:
         {
             "scenario": None,
             "run": "with --vary (default: all runs)",
-            "-o --output": option("draw it, too, as SVG", "FILE", output_file),
             "--json": "print all of it as JSON",
             "--vary": option("a key, such as channel.delay_s=0,0.1,0.3; without values some usual ones", "KEY=VALUES"),
             "--jobs": None,
@@ -38,7 +46,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the budget, and draw it on request."""
     options = parser().parse_args(arguments)
     from airground_drake.scenario.budget import alike, budget
     from airground_drake.scenario.load import load
@@ -49,10 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.run is not None:
         return refuse(f"run {options.run!r}: a budget is the same for all runs; wanted: --vary, or no run")
     groups = alike(budget(scenario))
-    if options.output is not None:
-        from airground_drake.report.view.budget import drawn
-
-        files.write_text(options.output, drawn([(_about(group), group[0]) for group in groups]))
     if options.json:
         print(json.dumps([_entry(group) for group in groups], indent=1))
         return 0
@@ -68,39 +71,65 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
-    """Distances and arrivals by the values of one key."""
+    from pandas import DataFrame
+
     from airground_drake.scenario.document import parsed
-    from airground_drake.study.campaign.vary import as_text, usual_values, vary
+    from airground_drake.study.campaign.sweep import sweep
 
     key, _, given = options.vary.partition("=")
-    values = parsed(f"[{given}]", "--vary").data or usual_values(key)
-    rows = vary(scenario, key, values, [options.run] if options.run else (), options.jobs or processors())
-    if options.output is not None:
-        from airground_drake.report.view.budget import drawn_by_value
-
-        files.write_text(options.output, drawn_by_value(rows, key))
+    usual = next(values for unit, values in USUAL.items() if key.endswith(unit))
+    values = parsed(f"[{given}]", "--vary").data or usual
+    runs = [options.run] if options.run else ()
+    rows = sweep(scenario, {key: values}, runs, [DISTANCES], options.jobs or processors())
+    costs = [{"index": k} | _costs(scenario, key, value) for k, value in enumerate(values)]
+    rows = rows.merge(DataFrame(costs))
     if options.json:
         print(json.dumps(rows.astype(object).where(rows.notna(), None).to_dict("records"), indent=1))
-        return 0
-    print(as_text(rows, key))
+    else:
+        print(_as_text(rows, key))
     return 0
 
 
+def _costs(scenario: Scenario, key: str, value: object) -> dict[str, float]:
+    """By kind of pair, what is promised and kept by the pair to which most is added; nothing for a refused value."""
+    from airground_drake.scenario.budget import budget
+    from airground_drake.scenario.load import validated
+
+    try:
+        pairs = budget(validated(scenario, {key: value}))
+    except ScenarioError:
+        return {}
+    dearest = {pair.kind: pair for pair in sorted(pairs, key=lambda pair: pair.gap_m - pair.promised_m)}
+    return {
+        f"{kind} {name}": metres
+        for kind, pair in dearest.items()
+        for name, metres in ((PROMISED, pair.promised_m), (LAW, pair.gap_m))
+    }
+
+
+def _as_text(rows: DataFrame, key: str) -> str:
+    """A line for each value and run; below, what its columns mean, and the reasons of what was not judged."""
+    judged = rows["ended"] == JUDGED
+    shown = rows[[key, "run", "ended"]].copy()
+    for law in rows.columns[rows.columns.str.endswith(LAW)]:
+        kind = law.removesuffix(LAW)
+        promised = rows[f"{kind}{PROMISED}"].map("{:.3f}".format)
+        shown[f"{kind}m"] = (promised + rows[law].map(" -> {:.3f}".format)).where(rows[law].notna(), "-")
+    shown["arrived"] = (rows["arrived"].map(str) + " of " + rows["ugvs"].map(str)).where(judged, "-")
+    shown["last at, s"] = rows["arrival_s"].round(2)
+    shown[DISTANCES] = rows[DISTANCES].fillna("-") if DISTANCES in rows else "-"
+    return "\n".join([shown.to_string(index=False, na_rep="-"), "", MEANING, *dict.fromkeys(rows["what"][~judged])])
+
+
 def _about(group: Sequence[PairBudget]) -> str:
-    """The pairs of a group in words."""
     first, second = (list(dict.fromkeys(getattr(pair, name) for pair in group)) for name in ("first", "second"))
     kind = group[0].kind
     if kind in ("ugv", "uav"):
-        return f"two {kind.upper()}s ({_named([*dict.fromkeys([*first, *second])])})"
+        return f"two {kind.upper()}s ({some([*dict.fromkeys([*first, *second])], MOST_NAMED)})"
     if kind == "air_ground":
-        return f"{_named(first)} and {_named(second)}"
-    return f"{_named(first)} beside {_named(second)}{', which may move' if kind == 'moving' else ''}"
-
-
-def _named(names: Sequence[str]) -> str:
-    """Some names, and how many more there are."""
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+        return f"{some(first, MOST_NAMED)} and {some(second, MOST_NAMED)}"
+    moves = ", which may move" if kind == "moving" else ""
+    return f"{some(first, MOST_NAMED)} beside {some(second, MOST_NAMED)}{moves}"
 
 
 def _entry(group: Sequence[PairBudget]) -> dict[str, object]:

@@ -67,8 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _all(spec: Spec, options: argparse.Namespace) -> int:
     from airground_drake.study.campaign import pool
-    from airground_drake.study.campaign.conduct import conduct
-    from airground_drake.study.campaign.stopping import Stopping
+    from airground_drake.study.campaign.conduct import Stopping, conduct
 
     stopping = Stopping.parse(options.stop_when, spec.claims) if options.stop_when else None
     folder = options.output or Path("campaigns") / spec.name
@@ -86,7 +85,6 @@ def _all(spec: Spec, options: argparse.Namespace) -> int:
 
 
 def _only(spec: Spec, options: argparse.Namespace) -> int:
-    """One draw alone: its verdicts, and its scenario as a file that `report` takes."""
     from airground_drake.scenario.document import text_of
     from airground_drake.scenario.load import resolved
     from airground_drake.study.campaign.evidence import evidence
@@ -124,7 +122,6 @@ def _code(result: dict[str, Any]) -> int:
 
 
 def _undecided(result: dict[str, Any]) -> list[str]:
-    """The reasons of exit code 3, in words."""
     draws, ended = result["draws"], result["ended"]
     lines = [f"{ended[name]} of {draws} draws {name}" for name in UNFINISHED if name in ended]
     for claim in result["claims"]:
@@ -163,7 +160,6 @@ def _summary(result: dict[str, Any], *, looked: bool) -> str:
 
 
 def _by_value(entry: dict[str, Any]) -> str:
-    """What became of the runs with one value of a swept key, as a line."""
     refuted = [claim for claim, counts in entry["claims"].items() if counts["refuted"]]
     times = [
         f"{words} {entry[name]:.4g} s"

@@ -58,7 +58,6 @@ Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 3 not reproduced here
 
 
 def parser() -> argparse.ArgumentParser:
-    """Make the parser: that of the checker, and further options."""
     says = "Check a report from its files alone; with --simulate, simulate its runs again."
     made = checker.parser("airground check", says, EPILOG)
     made.add_argument("--simulate", action="store_true", help="simulate the runs again: all tables must agree exactly")
@@ -69,7 +68,6 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Check, and print a line for each check."""
     # Exit code: 0 all agree, 1 not all, 2 usage or no report, 3 not reproduced here, 4 a fault of the checker.
     try:
         options = parser().parse_args(arguments)

@@ -83,7 +83,6 @@ def _lines(changes_of: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _line(change: Mapping[str, Any]) -> str:
-    """A change in a line: its subject, before, after."""
     about = " ".join(str(change[key]) for key in _ABOUT if change.get(key))
     unit = f" {change['unit']}" if change.get("unit") else ""
     relative = change.get("relative")
@@ -103,7 +102,6 @@ def _side(value: Any) -> str:
 
 
 def _page(folders: tuple[Path, Path], before: Report, after: Report, changed: Mapping[str, Any]) -> str:
-    """The comparison as a page."""
     from airground_drake.report.html import render_beside
 
     worse = [

@@ -25,7 +25,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the pictures, and print their paths."""
     options = parser().parse_args(arguments)
     from airground_drake.scenario.load import load
     from airground_drake.sim import graphviz

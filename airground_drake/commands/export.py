@@ -21,7 +21,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the files, and print their paths."""
     options = parser().parse_args(arguments)
     runs = runs_of(options.folder, options.run)
     outside_reports(options.output, "the files")
@@ -32,12 +31,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _written(report: Path, run: str, kind: str, output: Path) -> Iterator[Path]:
-    """Write a run; yield each file."""
-    from airground_drake.report.export import recording, tables
+    from airground_drake.report.export import recording
 
     saved, scenario = trace_of(report, run)
     if kind == "csv":
-        yield from tables.write(saved, output)
+        yield from recording.write(saved, output)
     else:
         path = output / f"{saved.run}.mcap"
         files.write_bytes(path, recording.recorded(saved, scenario))

@@ -25,8 +25,7 @@ from airground_drake.scenario.shipped import argument
 from airground_drake.study.campaign.rows import COLUMNS
 
 if TYPE_CHECKING:
-    from airground_drake.study.campaign.falsification import Best, Search
-    from airground_drake.study.campaign.objective import Objective
+    from airground_drake.study.campaign.falsification import Best, Objective, Search
     from airground_drake.study.campaign.pool import Pool
     from airground_drake.study.campaign.spec import Spec
 
@@ -54,7 +53,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Search; the exit codes are in the help."""
     options = parser().parse_args(arguments)
     if options.limit is not None and options.most is None:
         return refuse("--limit is of a time: name it with --most")
@@ -72,8 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(spec: Spec, options: argparse.Namespace) -> int:
     from airground_drake.study.campaign import pool
     from airground_drake.study.campaign.distributions import dimensions
-    from airground_drake.study.campaign.falsification import Search, falsify
-    from airground_drake.study.campaign.objective import Margin, Most
+    from airground_drake.study.campaign.falsification import Margin, Most, Search, falsify
     from airground_drake.study.campaign.search import Sampler
 
     limit = math.inf if options.limit is None else options.limit
@@ -128,7 +125,6 @@ def _try(search: Search, pool: Pool) -> None:
 
 
 def _small(path: Path) -> Path:
-    """Where the smaller scenario is written."""
     return path.with_stem(f"{path.stem}_small")
 
 

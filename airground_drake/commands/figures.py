@@ -24,7 +24,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the files, and print their paths."""
     options = parser().parse_args(arguments)
     runs = runs_of(options.folder)
     outside_reports(options.output, "the figures")

@@ -27,7 +27,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the page, and print its path."""
     print(one_line(str(_write(parser().parse_args(arguments).folder))))
     return 0
 
@@ -57,7 +56,6 @@ def _write(place: Path) -> Path:
 
 
 def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
-    """Return the values that the page shows of a report; ReportError or FolderError if it cannot be used."""
     from airground_drake.report import model
 
     content = model.read(report)

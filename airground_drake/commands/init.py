@@ -27,7 +27,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the file; an existing file is left alone."""
     options = parser().parse_args(arguments)
     if options.fleet is None and (options.obstacles, options.seed) != (None, None):
         return refuse("--obstacles and --seed need --fleet")

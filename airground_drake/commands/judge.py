@@ -92,7 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse("--rate-hz is for times that are numbers of frames, --time-unit for others: use one of the two")
     log = opening.opened(options.logs, tables.Wanted(bodies, rename, options.map_columns))
     joined = tracks.joined(log, document, choice)
-    errors = _errors(options.position_error, bodies)
+    error_of: dict[str, float] = dict(options.position_error)  # one without a name is of all others
+    errors = {name: error_of.get(name, error_of.get("", 0.0)) for name in bodies}
     judged = judging.judge(joined, document, errors)
     if options.output is not None:
         from airground_drake.commands.saved import outside_reports
@@ -155,9 +156,3 @@ def _error(text: str) -> tuple[str, float]:
         wanted = f"wanted: metres from 0 to {MOST_ERROR_M:g}, or BODY=metres"
         raise argparse.ArgumentTypeError(f"{text!r} is not allowed; {wanted}")
     return name, value
-
-
-def _errors(given: Sequence[tuple[str, float]], bodies: Sequence[str]) -> dict[str, float]:
-    """Position errors by body; one without a name is of all others."""
-    named = dict(given)
-    return {name: named.get(name, named.get("", 0.0)) for name in bodies}

@@ -32,7 +32,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the kinds that were asked for."""
     options = parser().parse_args(arguments)
     if options.schema:
         from airground_drake.scenario import json_schema
@@ -51,7 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _print_one(kind: str, name: str) -> int:
-    """Print what a name stands for, with its parameters."""
     names = dict(KINDS[kind]())
     if name not in names:
         raise UnknownNameError(f"name among the {kind}", name, names)

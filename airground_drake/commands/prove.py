@@ -36,7 +36,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Check or prove, and print the results; the exit codes are in the help."""
     from airground_drake.verify.proofs.coq import CoqError
 
     options = parser().parse_args(arguments)
@@ -51,7 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _theorems(*, record: bool, limit_s: float) -> int:
-    """Check the package's theorems."""
     from airground_drake.verify.proofs import coq
     from airground_drake.verify.proofs.theorems import THEOREMS
 
@@ -74,7 +72,6 @@ def _theorems(*, record: bool, limit_s: float) -> int:
 
 
 def _runs(options: argparse.Namespace) -> int:
-    """Prove the runs of a report."""
     from airground_drake.report import proved
     from airground_drake.verify.proofs.runs import prove_report
 
@@ -89,7 +86,6 @@ def _runs(options: argparse.Namespace) -> int:
 
 
 def _lines(proof: Proved) -> list[str]:
-    """The lines about a run."""
     lines = []
     pairs = "1 pair" if proof.lawful == 1 else f"{proof.lawful} pairs"
     some = "" if proof.lawful == proof.pairs else f" by {pairs} (of robots without lag, and with balls at rest)"

@@ -19,35 +19,32 @@ def parser() -> Parser:
         "run": "default: all runs, a file each",
         "-o --output": {"help": "folder for the pages, or a name.html for RUN (default: .)", "metavar": "PLACE",
                         "default": Path()},
-        "--live": "write nothing; serve the pages on this machine",
         "--video": option("write RUN as a video instead: .webp or .mp4", "FILE", output_file),
         "--speed": option(f"with --video: its speed (default: {SPEED:g})", "X", between(SLOWEST, FASTEST)),
-    }, exclusive=("-o --output", "--live", "--video"))  # fmt: skip
+    }, exclusive=("-o --output", "--video"))  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or serve the replays."""
     options = parser().parse_args(arguments)
     if options.video and not options.run:
         return refuse("--video needs a RUN")
     if options.speed and not options.video:
         return refuse("--speed needs --video")
-    from airground_drake.report.replay import live, video
+    from airground_drake.report.replay import video
     from airground_drake.report.replay.page import page
     from airground_drake.report.replay.scene import scene
 
     folder, runs = options.folder, runs_of(options.folder, options.run)
-    if options.live:
-        live.serve(runs, lambda name: page(scene(*trace_of(folder, name))))
-    elif options.video:
+    if options.video:
         outside_reports(options.video.parent, "the video")
         video.write(scene(*trace_of(folder, options.run)), options.video, options.speed or SPEED)
         print(one_line(str(options.video)))
     else:
         for name, path in _paths(options.output, runs).items():
             outside_reports(path.parent, "the pages")
-            mark = _mark(folder, name)
-            if path.exists() and not _has(path, mark):
+            # the last line of a run's page; it stays the same when the report is made again
+            mark = f"<!-- airground replay {files.sha256(f'{folder.resolve()}/{name}'.encode())} -->"
+            if path.exists() and not (path.is_file() and mark.encode() in files.read_bytes(path)[-2 * len(mark) :]):
                 why = "is not a replay of this run of"
                 raise FolderError(one_line(f"{path} {why} {folder}; it is left alone; name another place, with -o"))
             files.write_text(path, f"{page(scene(*trace_of(folder, name)))}{mark}\n")
@@ -62,15 +59,3 @@ def _paths(output: Path, runs: Sequence[str]) -> dict[str, Path]:
     if len(runs) > 1:
         raise FolderError(one_line(f"{output} is one file for the runs {', '.join(runs)}; name a RUN, or a folder"))
     return {runs[0]: output}
-
-
-def _mark(folder: Path, run: str) -> str:
-    """Return the last line of a run's page. It stays the same when the report is made again."""
-    return f"<!-- airground replay {files.sha256(f'{folder.resolve()}/{run}'.encode())} -->"
-
-
-def _has(path: Path, mark: str) -> bool:
-    """Whether a path is a plain file that ends with a mark."""
-    if not path.is_file():
-        return False
-    return mark.encode() in files.read_bytes(path)[-2 * len(mark) :]

@@ -37,7 +37,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Simulate, and print."""
     options = parser().parse_args(arguments)
     if options.speed and not options.meshcat:
         return refuse("--speed needs --meshcat")
@@ -90,7 +89,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _said(trace: Trace) -> Iterator[str]:
-    """A line for the run, then one for each event."""
     method = str(trace.meta["method"])
     yield f"{trace.scenario.name}, run {trace.run}: method ({method}), {METHODS[method].says}; {trace.t[-1]:g} s"
     for event in trace.events:

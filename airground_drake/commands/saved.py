@@ -37,7 +37,6 @@ def outside_reports(folder: Path, what: str) -> None:
 
 
 def trace_of(folder: Path, run: str) -> tuple[Trace, Scenario]:
-    """Load the trace of a run, and the scenario that it was simulated with."""
     from airground_drake.scenario.load import from_data
     from airground_drake.sim import trace
 

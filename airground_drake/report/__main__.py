@@ -40,7 +40,6 @@ AUDIT_DESCRIPTION = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line."""
     # Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error.
     options = parser().parse_args(arguments)
     if options.scenario is None and not options.list:
@@ -62,7 +61,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _reported(options: argparse.Namespace, command: str) -> int:
-    """Load the scenario and report on it."""
     from airground_drake.scenario.load import load
     from airground_drake.scenario.notes import notes
 
@@ -71,7 +69,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     scenario = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-    from airground_drake.report import attention, make, model, terminal  # slow to import: only for a valid scenario
+    from airground_drake.report import attention, make, model, screen  # slow to import: only for a valid scenario
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
@@ -97,7 +95,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     if not options.quiet:
         for item in attention.beforehand(report):
             print(f"{item.words}{f', run {item.run}' if item.run else ''}")
-        print(terminal.text(report))
+        print(screen.text(report))
         print(f"{scenario.name}: {overall.status.replace('_', ' ')}. {overall.why}")
         print(errors.one_line(str(output)))
     if options.open and "html" in options.format:
@@ -113,7 +111,6 @@ def _findings(
     *,
     audited: bool,
 ) -> list[dict[str, Any]]:
-    """Findings about the paper: those that the runs show and, if it is `audited`, all others."""
     from airground_drake.report import audit
 
     if not audited:

@@ -5,16 +5,15 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from airground_drake.base import files
 from airground_drake.base.parallel import processes
 from airground_drake.base.progress import Progress
 from airground_drake.report import document, folder, junit, metrics, model
 from airground_drake.report.figures.draw import draw
-from airground_drake.report.figures.panels import Figure
 from airground_drake.report.folder import PAGES
-from airground_drake.report.page import page
+from airground_drake.report.html import page
 from airground_drake.scenario import map_file, plugins
 from airground_drake.scenario.schema import MapCells, Scenario
 from airground_drake.sim import graphviz, trace
@@ -27,35 +26,6 @@ from airground_drake.verify.registry import model_claims
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib", "daqp")
 
 
-class JudgedRuns(NamedTuple):
-    """The runs of a scenario, what is said of them, and their figures."""
-
-    traces: Mapping[str, Trace]
-    verdicts: Sequence[Verdict]
-    findings: Sequence[Mapping[str, Any]]
-    figures: Sequence[Figure]
-    seeds: Sequence[dict[str, Any]]
-
-
-def judge(
-    scenario: Scenario,
-    traces: Mapping[str, Trace],
-    progress: Progress,
-    *,
-    drawn: bool,
-    kept: Path | None,
-    seeds: int,
-    audit: Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]] | None,
-) -> JudgedRuns:
-    """Judge the runs and the model and, if asked for, the paper and other seeds; draw the runs at the same time."""
-    of_seeds = with_seeds(scenario, traces, seeds, progress) if seeds else ()
-    with processes(1) as another:
-        figures = another.submit(draw, scenario, traces) if drawn else None
-        verdicts = judge_all(scenario, traces.values(), kept=kept, progress=progress)
-        findings = audit(scenario, traces, verdicts) if audit else ()
-        return JudgedRuns(traces, verdicts, findings, figures.result() if figures else (), of_seeds)
-
-
 def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progress: Progress) -> list[dict[str, Any]]:
     """The outcome of every run with each of the seeds 1 to `number`, by run, then by seed; see `metrics.outcome`."""
     others = [seed for seed in range(1, number + 1) if seed != scenario.seed]
@@ -65,29 +35,39 @@ def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progre
     return sorted(outcomes, key=lambda row: (order[row["run"]], row["seed"]))
 
 
-def write(
+def finish(
     scenario: Scenario,
+    traces: Mapping[str, Trace],
     output: Path,
+    progress: Progress,
     formats: Sequence[str],
-    judged: JudgedRuns,
-    provenance: dict[str, Any],
+    provenance: Callable[[], dict[str, Any]],
     *,
+    kept: Path | None,
+    seeds: int,
+    audit: Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]] | None,
     audited: bool,
 ) -> dict[str, Any]:
-    """Write the folder, and return the document; arguments as of `make.write_report` and `document.build`."""
+    """Judge and draw the runs, write the folder, and return the document; arguments as of `make.Wanted`."""
+    of_seeds = with_seeds(scenario, traces, seeds, progress) if seeds else ()
+    with processes(1) as another:
+        drawn = another.submit(draw, scenario, traces) if "html" in formats else None
+        verdicts = judge_all(scenario, traces.values(), kept=kept, progress=progress)
+        findings = audit(scenario, traces, verdicts) if audit else ()
+        figures = drawn.result() if drawn else ()
+    progress.stage("writing")
+    origin = provenance()
     dot = graphviz.dot(build_diagram(plugins.without(scenario), method_drawn(scenario)))
     pages = {"diagram.dot": dot, "diagram.svg": graphviz.svg(dot)}
     required = [claim.id for claim in model_claims(added=scenario.claims) if claim.may_apply(scenario)]
-    traces = judged.traces
     report = document.build(
-        scenario, traces, judged.verdicts, provenance,
-        audit=judged.findings, audited=audited, required=required, seeds=judged.seeds,
-    )  # fmt: skip
+        scenario, traces, verdicts, origin, audit=findings, audited=audited, required=required, seeds=of_seeds
+    )
     told = model.of(report)
     if "junit" in formats:
         pages[PAGES["junit"]] = junit.render(told)
     if "html" in formats:
-        pages[PAGES["html"]] = page(told, judged.figures, pages["diagram.svg"])
+        pages[PAGES["html"]] = page(told, figures, pages["diagram.svg"])
     folder.clear(output)
     written = [*pages]
     for name, of_run in traces.items():
@@ -130,7 +110,6 @@ def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str,
 
 
 def versions() -> dict[str, str]:
-    """Versions of the package and of the libraries that its numbers depend on."""
     installed = {}
     for name in PACKAGES:
         try:
@@ -141,7 +120,6 @@ def versions() -> dict[str, str]:
 
 
 def _solver(scenario: Scenario, daqp: str) -> str:
-    """The solver of (26) under method (c)."""
     route, solver = scenario.gatekeeper.route, scenario.gatekeeper.solver
     if route != "mixed_integer":
         return f"that of the route {route}"

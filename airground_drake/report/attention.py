@@ -4,15 +4,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from airground_drake.base.errors import one_line
-from airground_drake.base.statuses import UNDECIDED, outcome
+from airground_drake.base.statuses import PASSING, UNDECIDED, outcome
 from airground_drake.report.model import Claim, Report, Run
-from airground_drake.report.phrases import bodies_of, found_no_way, in_words, place_of
-from airground_drake.report.sentences import MAX_NAMES, counted, grouped
+from airground_drake.report.outcomes import distance, named
+from airground_drake.report.sentences import MAX_NAMES, counted, grouped, joined, some
 from airground_drake.scenario.validate import preset_s
 from airground_drake.ugv.reasons import refusal
 
 MAX_FAULT_CHARS = 300
 MAX_FAULTS = 3  # maximum number of kinds of faults listed per run; its section of the page has more
+ROLES = ("first", "second", "robot", "other")  # keys that hold the name of a body in the place of a claim
 
 
 class Item(NamedTuple):
@@ -82,10 +83,7 @@ def beforehand(report: Report) -> Iterator[Item]:
     longer = {name: preset_s(ugv.preset.waypoints_m, ugv.preset.speed_m_s) for name, ugv in scenario.ugvs.items()}
     longer = {name: time_s for name, time_s in longer.items() if time_s > scenario.duration_s}
     if longer:
-        names = list(longer)
-        who = ", ".join(names[:MAX_NAMES])
-        if len(names) > MAX_NAMES:
-            who += f" and {len(names) - MAX_NAMES} more"
+        who = some([*longer], MAX_NAMES)
         ends = f"duration_s = {scenario.duration_s:g} ends the runs before the presets of {who} do"
         yield Item("inconclusive", f"{ends} ({max(longer.values()):.3g} s): they cannot be expected to arrive")
 
@@ -130,3 +128,50 @@ def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
         }
         for (policy, what), alike in kinds.items()
     ]
+
+
+def found_no_way(names: Sequence[str]) -> str:
+    return f"the UAV found no way for {joined(names) if len(names) <= MAX_NAMES else f'{len(names)} robots'}"
+
+
+def place_of(claim: Claim) -> dict[str, Any]:
+    """Where the margin of a claim is, and its counterexample."""
+    return {**claim.where, **(claim.counterexample or {})}
+
+
+def bodies_of(claim: Claim) -> list[str]:
+    place = place_of(claim)
+    there = {role: place[role] for role in ROLES if isinstance(place.get(role), str)}
+    return list(
+        dict.fromkeys(named(name, place.get("at_m") if role == "second" else None) for role, name in there.items())
+    )
+
+
+def in_words(claim: Claim) -> str:
+    """What came of a claim, as far as it is known: who, how far from what was allowed, when."""
+    place, who = place_of(claim), " and ".join(bodies_of(claim))
+    known = {name: value for name, value in place.items() if isinstance(value, float | int)}
+    at = f", {known['t_s']:.3f} s" if "t_s" in known else ""
+    if claim.status in PASSING:
+        idle = claim.exercised == 0
+        return f"nothing put it to the test: no {claim.exercised_by}" if idle else f"{claim.status} all the same"
+    if claim.status != "refuted":
+        why = claim.evidence.get("reason") or claim.evidence.get("error")
+        return why if isinstance(why, str) else "could not be decided"
+    if {"min_distance_m", "safe_distance_m"} <= known.keys():
+        apart = distance(known["min_distance_m"], known["safe_distance_m"])
+        return f"{who} at {apart}, {known['safe_distance_m']:g} m required{at}"
+    if {"distance_m", "margin_m"} <= known.keys() and "condition" in place:
+        allowed = known["distance_m"] + known["margin_m"]
+        ended = f"collided at {known['collided_s']:.2f} s," if "collided_s" in known else "ended"
+        return f"{who} {ended} {known['distance_m']:.2f} m from where it must end, {allowed:g} m allowed"
+    who = f"{who}: " if who else ""
+    if {"parameter", "built", "scenario"} <= place.keys():
+        return f"{who}{place['parameter']} was built as {place['built']}, the scenario has {place['scenario']}"
+    margin, unit = known.get("margin", claim.margin), place.get("unit", claim.unit)
+    if margin is not None:
+        quantity = place.get("hypothesis") or place.get("condition") or claim.quantity or "margin"
+        missed = f"missed by {-margin:.3g} {unit}" if margin < 0.0 else f"{margin:.3g} {unit} left"
+        return f"{who}{quantity} {missed}{at}"
+    what = next((str(place[key]) for key in ("quantity", "what", "kind", "reason") if place.get(key)), "refuted")
+    return f"{who}{what}{at}"

@@ -35,7 +35,6 @@ E = TypeVar("E", bound="Entry")
 
 
 def compared(before: Report, after: Report) -> dict[str, Any]:
-    """What differs."""
     # Returns strict JSON: `regressions`, a count; lists of changes `inputs`, `overall` (one at most), `verdicts`,
     # `margins`, `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None
     # if missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`, `kind` and
@@ -54,11 +53,6 @@ def compared(before: Report, after: Report) -> dict[str, Any]:
     for change in (changes := [change for part in changes_of.values() for change in part]):
         change.setdefault("worse", False)
     return {"regressions": sum(change["worse"] for change in changes), **changes_of}
-
-
-def is_rounding(change: Change) -> bool:
-    """Whether a number changed by no more than rounding differs between versions of numpy, scipy and solvers."""
-    return not change["worse"] and not any(differences(change["before"], change["after"]))
 
 
 def differences(
@@ -87,7 +81,10 @@ def _is_number(value: Any) -> bool:
 
 def rounded(changes_of: Mapping[str, Any], part: str) -> list[Change]:
     """The changes of a part by no more than rounding; whatever changes in the inputs counts."""
-    return [] if part == "inputs" else [change for change in changes_of[part] if is_rounding(change)]
+    return [
+        change for change in changes_of[part]
+        if part != "inputs" and not change["worse"] and not any(differences(change["before"], change["after"]))
+    ]  # fmt: skip
 
 
 def _inputs(before: Report, after: Report) -> Iterator[Change]:
@@ -131,7 +128,6 @@ def _verdicts(before: Report, after: Report) -> Iterator[Change]:
 
 
 def _of_claims(before: Report, after: Report, field: str) -> Iterator[Change]:
-    """Changes of a field of claims that are in both reports."""
     for (claim, run), old, new in _paired(before.claims, after.claims, "id", "run"):
         was, now = getattr(old, field, None), getattr(new, field, None)
         if old and new and was != now:
@@ -148,7 +144,6 @@ def _rows(before: Report, after: Report) -> Iterator[Change]:
 
 
 def _findings(before: Report, after: Report) -> Iterator[Change]:
-    """Findings about the paper."""
     for (number,), old, new in _paired(before.audit, after.audit, "id"):
         was, now = (finding and finding.model_dump(include={"demonstrated", "paper", "ours"}) for finding in (old, new))
         if was != now:

@@ -23,7 +23,6 @@ def first_difference(recorded: Trace, made: Trace) -> Difference | None:
 
 
 def _first_cell(name: str, recorded: pd.DataFrame, made: pd.DataFrame) -> Difference | None:
-    """The first cell in which two tables differ."""
     if [*recorded] != [*made]:
         return first_of([*recorded], [*made], f"{name}: column")
     rows = min(len(recorded), len(made))

@@ -12,7 +12,7 @@ from airground_drake.base.registry import method_of
 from airground_drake.base.statuses import COUNTS, NOT_EXERCISED, STATUSES, UNDECIDED, outcome
 from airground_drake.report import metrics, reproduction
 from airground_drake.report.model import SCHEMA
-from airground_drake.report.sentences import counted
+from airground_drake.report.sentences import counted, some
 from airground_drake.scenario.document import place_of, way
 from airground_drake.scenario.plugins import OPTION
 from airground_drake.scenario.schema import Scenario
@@ -99,13 +99,17 @@ def overall(
         status = "not_as_expected"
         differ = "differs" if len(differs) == 1 else "differ"
         why = f"{len(differs)} of {counted(checks, 'check')} {differ} from what the scenario declares: "
-        why += f"{_listed(differs)}."
+        why += f"{some([*map(_told, differs)], MOST_LISTED)}."
     elif undemonstrated:
         status = "not_as_expected"
         why = f"Findings about the paper that were not demonstrated: {', '.join(map(str, undemonstrated))}."
     elif undecided or absent or not claims:
         status, left = "inconclusive", [*undecided, *absent]
-        why = f"{counted(len(left), 'check')} could not be decided: {_listed(left)}." if left else "No checks."
+        why = (
+            f"{counted(len(left), 'check')} could not be decided: {some([*map(_told, left)], MOST_LISTED)}."
+            if left
+            else "No checks."
+        )
     else:
         status, why = "as_expected", f"All {counted(checks, 'check')} gave the verdict that the scenario declares."
     return {
@@ -181,19 +185,12 @@ def _run(scenario: Scenario, trace: Trace) -> dict[str, Any]:
 
 
 def _at(resolved: Mapping[str, Any], key: str) -> Any:
-    """The value at a dotted key of the resolved scenario, None if the key leads nowhere."""
     values = way(resolved, key)
     return values[-1] if len(values) == len(place_of(key)) else None
 
 
 def _named(claims: Iterable[Mapping[str, Any]]) -> list[dict[str, str]]:
     return [{"id": claim["id"], "run": claim["run"]} for claim in claims]
-
-
-def _listed(items: Sequence[Mapping[str, Any]]) -> str:
-    """The first few items in words."""
-    more = f" and {len(items) - MOST_LISTED} more" if len(items) > MOST_LISTED else ""
-    return ", ".join(map(_told, items[:MOST_LISTED])) + more
 
 
 def _told(item: Mapping[str, Any]) -> str:

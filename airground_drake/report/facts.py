@@ -37,47 +37,28 @@ class RunFacts:
         about = sorted((claim for claim in report.claims if claim.run in ("", name)), key=lambda claim: claim.run)
         self._claims = {claim.id: claim for claim in about}
         self.method = self._spec.method
+        method = METHODS.get(self.method)
+        self.is_helped = method is None or method.intervenes  # by the UAV; a method that is not ours may be
+        self._obeys = method is not None and method.intervenes and not method.gated
+        self.ugvs, self.uavs = [*self._scenario.ugvs], [*self._scenario.aerial]
         # Obstacles that may move.
         self.movers = [name for name, obstacle in self._scenario.obstacles.items() if obstacle.expected_speed_m_s]
         unique = {frozenset((near.robot, near.other)): near for near in reversed([*pairs(self.run)])}
         self.near = sorted(unique.values())  # the least distance of each pair, those of least margin first
         # The first collision of each robot that collided, an event. What these robots do later does not count.
         self.hits = first_collisions(event.model_dump() for event in self.run.events if event.kind == "collision")
+        self.collided = bool(self.hits)
+        self.arrived_s = {event.robot: event.t_s for event in reversed(self.run.events) if event.kind == "arrival"}
+        self.triggers = sum(event.kind == "trigger" for event in self.run.events)  # how often the UAV was called
 
     def claim(self, name: str) -> Claim:
-        """The verdict on a claim about this run or about the model."""
         return self._claims.get(name, UNJUDGED)
-
-    @property
-    def is_helped(self) -> bool:
-        """Whether the UAV intervenes; a method that is not ours may."""
-        return METHODS[self.method].intervenes if self.method in METHODS else True
-
-    @property
-    def _obeys(self) -> bool:
-        return self.method in METHODS and self.is_helped and not METHODS[self.method].gated
 
     # Safe?
 
     @property
-    def collided(self) -> bool:
-        """Whether any robot collided."""
-        return bool(self.hits)
-
-    @property
     def is_broken(self) -> bool:
-        """Whether a distance was not kept."""
         return any(near.is_short for near in self.near) or self.claim(rules.DISTANCES).status == "refuted"
-
-    @property
-    def distances_pass(self) -> bool:
-        """Whether all distances were checked, and kept."""
-        return self.claim(rules.DISTANCES).status in PASSING
-
-    @property
-    def untested(self) -> bool:
-        """Whether no pair came so near that it had to be kept apart."""
-        return self.claim(rules.DISTANCES).exercised == 0
 
     @property
     def is_proved(self) -> bool:
@@ -142,7 +123,6 @@ class RunFacts:
 
     @property
     def faster(self) -> list[str]:
-        """Obstacles that moved faster than declared."""
         beside = self.claim(rules.CONDITIONS).evidence.get("beside_moving", ())
         return sorted({mover["second"] for mover in beside if mover["too_fast_s"] is not None})
 
@@ -169,22 +149,8 @@ class RunFacts:
         before = {robot for robot, hit in self.hits.items() if self.arrived_s.get(robot, hit["t_s"]) < hit["t_s"]}
         return (arrived - self.hits.keys()) | before
 
-    @cached_property
-    def arrived_s(self) -> dict[str, float]:
-        """When each robot arrived first, s."""
-        return {event.robot: event.t_s for event in reversed(self.run.events) if event.kind == "arrival"}
-
-    @property
-    def ugvs(self) -> list[str]:
-        return [*self._scenario.ugvs]
-
-    @property
-    def uavs(self) -> list[str]:
-        return [*self._scenario.aerial]
-
     @property
     def lost_s(self) -> dict[str, float]:
-        """When UAVs were lost, s, by name."""
         until = self._scenario.duration_s
         return {name: uav.lost_at_s for name, uav in self._scenario.aerial.items() if 0.0 < uav.lost_at_s < until}
 
@@ -197,16 +163,6 @@ class RunFacts:
     def there(self) -> int:
         """How many UGVs arrived."""
         return len(self.home & {*self.ugvs})
-
-    @property
-    def failed(self) -> set[str]:
-        """UGVs for which a policy failed."""
-        return {fault["robot"] for fault in self.run.faults}
-
-    @property
-    def lost(self) -> list[str]:
-        """UGVs that the UAV was called for and found no way for."""
-        return self.run.no_way
 
     def way(self, robot: str) -> OnTheWay:
         """How far a UGV had come that neither arrived nor collided."""
@@ -251,11 +207,5 @@ class RunFacts:
 
     @property
     def refusals(self) -> Counter[str]:
-        """How many proposals were refused for each reason."""
         ends = (sent.ended for sent in self._metrics.interventions if sent.accepted_s is None)
         return Counter(end.reason for end in ends if end.how == "refused")
-
-    @property
-    def triggers(self) -> int:
-        """How often the UAV was called."""
-        return sum(event.kind == "trigger" for event in self.run.events)

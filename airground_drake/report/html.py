@@ -4,31 +4,33 @@ Its content security policy admits only its own style sheet and script, by their
 the filter of claims, nothing else.
 """
 
+import xml.etree.ElementTree as ET
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
+from html import unescape
 from importlib import resources
 from typing import Any
 
 import yaml
-from jinja2 import Environment
-from markupsafe import Markup
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from latex2mathml.converter import convert_to_element
+from markupsafe import Markup, escape
 
 from airground_drake.base.statuses import PASSING, outcome
-from airground_drake.report import attention, evidence, rules
+from airground_drake.report import attention, rules
+from airground_drake.report.figures import findings
+from airground_drake.report.figures.findings import of_chart
 from airground_drake.report.figures.panels import Figure, Table
-from airground_drake.report.mathml import mathml
 from airground_drake.report.model import Claim, Report
 from airground_drake.report.outcomes import pairs
 from airground_drake.report.proved import place
-from airground_drake.report.quantities import number, told
 from airground_drake.report.screen import first_screen
-from airground_drake.report.sentences import MARKS, grouped, unbroken
-from airground_drake.report.templating import environment_of
-from airground_drake.report.view import svg
-from airground_drake.report.view.canvas import DARK
+from airground_drake.report.sentences import MARKS, grouped, number, split, told, unbroken
+from airground_drake.report.view import canvas, svg
 from airground_drake.ugv.reasons import WORDS
+from airground_drake.verify.finding import Chart
 
 STYLE, SCRIPT = "report.css", "report.js"  # the style sheet and the script of the page, among the templates
 NOTHING = "'none'"  # in a content security policy: no source at all
@@ -81,10 +83,10 @@ CHIPS = {
     "demonstrated": ("✓", "demonstrated", "good"),
     "not_demonstrated": ("✗", "not demonstrated", "bad"),
 }
+MAX_ROWS, MAX_COLUMNS, MAX_CELL_CHARS = 40, 10, 200  # maximum size of a table; report.json has all of it
 
 
 def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
-    """The page."""
     # figures: as drawn by `figures.draw` and the like, in the order of the page.
     # diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
     distances = [(name, pair) for name, run in report.runs.items() for pair in pairs(run)]
@@ -125,13 +127,12 @@ def render_beside(template: str, **content: Any) -> str:
 
 @cache
 def environment() -> Environment:
-    """Renders the report's page and those beside it."""
     environment = environment_of("airground_drake.report")
     style = stylesheet()
     script = _template(SCRIPT)
     environment.filters.update(
         num=number, told=told, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
-        evidence=evidence_tables, proof=place, records=evidence.tables, unbroken=unbroken,
+        evidence=evidence_tables, proof=place, records=tables, unbroken=unbroken,
     )  # fmt: skip
     environment.globals.update(
         chips=CHIPS, shown=_shown, reasons=WORDS, max_faults=MAX_FAULTS, max_interventions=MAX_INTERVENTIONS,
@@ -148,12 +149,17 @@ def _shown(claim: Claim) -> str:
 
 
 def stylesheet() -> str:
-    """The style sheet of all pages."""
-    return _template(STYLE) + _in_the_dark()
+    # The last rules recolour drawings on a dark page; they name no ancestor, which would not match inside <use>.
+    dark = "\n".join(
+        f'[{name}="{light}"] {{ {name}: {dark}; }}'
+        for light, dark in canvas.DARK.items()
+        for name in ("fill", "stroke")
+    )
+    text = f"svg text:not([fill]) {{ fill: {canvas.DARK['black']}; }}"
+    return f"{_template(STYLE)}@media screen and (prefers-color-scheme: dark) {{\n{dark}\n{text}\n}}\n"
 
 
 def _template(name: str) -> str:
-    """The text of a file among the templates."""
     return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
 
 
@@ -170,21 +176,11 @@ def digest(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
-def _in_the_dark() -> str:
-    """Rules that recolour the drawings on a dark page; they name no ancestor, which would not match inside <use>."""
-    rules = "\n".join(
-        f'[{name}="{light}"] {{ {name}: {dark}; }}' for light, dark in DARK.items() for name in ("fill", "stroke")
-    )
-    text = f"svg text:not([fill]) {{ fill: {DARK['black']}; }}"
-    return f"@media screen and (prefers-color-scheme: dark) {{\n{rules}\n{text}\n}}\n"
-
-
 def evidence_tables(claim: Claim) -> list[Table]:
-    """Counterexample and evidence of a claim as tables."""
     on = f", run {claim.run}" if claim.run else ""
     return [
-        *evidence.tables(claim.counterexample or {}, f"{claim.id}, counterexample{on}"),
-        *evidence.tables(claim.evidence, f"{claim.id}, evidence{on}"),
+        *tables(claim.counterexample or {}, f"{claim.id}, counterexample{on}"),
+        *tables(claim.evidence, f"{claim.id}, evidence{on}"),
     ]
 
 
@@ -231,6 +227,90 @@ def _together(members: Sequence[Claim]) -> list[tuple[Claim, str]]:
 
 
 def _assumptions(claims: Sequence[Claim]) -> dict[str, list[str]]:
-    """Assumptions and the claims that make them; those of many claims first."""
     resting = grouped(dict.fromkeys((assumed, claim.id) for claim in claims for assumed in claim.assumptions))
     return dict(sorted(resting.items(), key=lambda item: -len(item[1])))
+
+
+def page(report: Report, figures: Sequence[Figure], diagram_svg: str | None) -> str:
+    of_audit = findings.draw([finding.model_dump() for finding in report.audit])
+    return render(report, [*figures, *_of_claims(report), *of_audit], diagram_svg)
+
+
+def _of_claims(report: Report) -> Iterator[Figure]:
+    """The charts of claims, where `rules.CHARTS` puts them, or else beside the claim."""
+    places = {*SECTIONS, *(f"audit-{finding.id}" for finding in report.audit)}
+    with canvas.style():
+        for number, claim in enumerate(report.claims):
+            if claim.figure:
+                place = rules.CHARTS.get(claim.id)
+                beside = place if place in places else claim.id
+                heading = claim.run and f"Run {claim.run}"
+                yield of_chart(Chart(**claim.figure), f"chart-{number}", heading, beside)
+
+
+@cache
+def mathml(latex: str) -> Markup:
+    """A formula as a block of MathML; a formula that the library cannot typeset is shown as it is written."""
+    # The library does not escape text, and a third-party claim may contain anything: `ET` writes the elements.
+    # latex: one row, without delimiters; a formula of several rows is given as several.
+    try:
+        root = convert_to_element(latex, display="block")
+    except Exception:  # the library has an exception for each mistake, without a common base
+        return Markup("<code>{}</code>").format(escape(latex))
+    for element in root.iter():
+        if element.tag == "mover":
+            element.set("accent", "true")  # a dot over a letter keeps its size
+        element.text = unescape(element.text or "") or None
+        for name in ("href", "style"):
+            element.attrib.pop(name, None)
+    return Markup(ET.tostring(root, encoding="unicode"))
+
+
+def tables(evidence: Mapping[str, Any], caption: str) -> list[Table]:
+    """The evidence: first one table of single values, then one for each key that holds several records."""
+    single = {key: value for key, value in evidence.items() if not _records(value)}
+    rows = tuple((in_words(key), _cell(value)) for key, value in single.items())
+    made = [Table(caption, ("quantity", "value"), rows[:MAX_ROWS])] if rows else []
+    for key, value in evidence.items():
+        if records := _records(value):
+            made.append(_table(f"{caption}: {in_words(key)}", records))
+    return made
+
+
+def _records(value: Any) -> list[tuple[str, Mapping[str, Any]]]:
+    """The records in a list, by number, or in a record, by key; empty if the value is neither."""
+    items = value.items() if isinstance(value, Mapping) else enumerate(value, 1) if isinstance(value, list) else ()
+    records = [(str(key), record) for key, record in items]
+    return records if all(isinstance(record, Mapping) and record for _, record in records) else []
+
+
+def _table(caption: str, records: Sequence[tuple[str, Mapping[str, Any]]]) -> Table:
+    keys = list(dict.fromkeys(key for _, record in records for key in record))
+    shown, left_out = keys[:MAX_COLUMNS], len(keys) - MAX_COLUMNS
+    rows = tuple((head, *(_cell(record[key]) if key in record else "" for key in shown)) for head, record in records)
+    more = [f"{len(rows) - MAX_ROWS} more rows"] if len(rows) > MAX_ROWS else []
+    if left_out > 0:
+        more.append(f"{left_out} more columns")
+    note = f" ({', '.join(more)} in report.json)" if more else ""
+    return Table(f"{caption}{note}", ("", *map(in_words, shown)), rows[:MAX_ROWS])
+
+
+def in_words(key: str) -> str:
+    """The name and the unit in a key, in one text: "min distance, m"."""
+    return ", ".join(filter(None, split(key)))
+
+
+def _cell(value: Any) -> str:
+    text = told(value)
+    return text if len(text) <= MAX_CELL_CHARS else f"{text[:MAX_CELL_CHARS]}…"
+
+
+def environment_of(*packages: str) -> Environment:
+    """An environment for the templates of these packages: it escapes every value and refuses undefined names."""
+    return Environment(
+        loader=ChoiceLoader([PackageLoader(package) for package in packages]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

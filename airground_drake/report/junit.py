@@ -47,7 +47,6 @@ def _case(suite: ET.Element, scenario: str, run: str, claim: str) -> ET.Element:
 
 
 def _outcome(case: ET.Element, claim: Claim) -> None:
-    """Add to a test case what came of its claim."""
     idle = outcome(claim.status, claim.exercised) == NOT_EXERCISED
     status = f"{claim.status}, nothing to check (0 {claim.exercised_by})" if idle else claim.status
     if claim.as_expected is not False:
@@ -70,7 +69,6 @@ def _outcome(case: ET.Element, claim: Claim) -> None:
 
 
 def _count(element: ET.Element, suites: list[ET.Element], seconds: float) -> None:
-    """Set the totals of a suite, or of all suites."""
     paths = {"tests": "testcase", "failures": "*/failure", "errors": "*/error", "skipped": "*/skipped"}
     for total, path in paths.items():
         element.set(total, str(sum(len(suite.findall(path)) for suite in suites)))

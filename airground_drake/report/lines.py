@@ -17,19 +17,16 @@ Line = dict[str, Any]
 
 
 def line_of(claim: str, run: str, outcome: str, text: str, rule: str = "") -> Line:
-    """A line without values."""
     return {"claim": claim, "run": run, "outcome": outcome, "text": text, "rule": rule}
 
 
 def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
-    """A line about a value that is not as recorded."""
     text = f"made again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
     values = {"about": about, "recorded": theirs, "recomputed": ours}
     return line_of(claim, run, DISAGREES, text, "the files give what is recorded") | values
 
 
 def short(value: Any, most: int = 120) -> str:
-    """A value for reading, cut if it is long."""
     text = repr(value)
     return text if len(text) <= most else f"{text[:most]}..."
 

@@ -86,11 +86,11 @@ def write_report(
         traces = simulate_all(scenario, progress=progress, meanwhile=partial(import_module, _NEXT))
         from airground_drake.report import after_runs
 
-        judged = after_runs.judge(
-            scenario, traces, progress,
-            drawn="html" in wanted.formats, kept=wanted.kept, seeds=wanted.seeds, audit=wanted.audit,
+        def provenance() -> dict[str, Any]:
+            origin = after_runs.provenance(scenario, started, wanted.command)
+            return origin | {"wall_s": time.perf_counter() - clock}
+
+        return after_runs.finish(
+            scenario, traces, output, progress, wanted.formats, provenance,
+            kept=wanted.kept, seeds=wanted.seeds, audit=wanted.audit, audited=wanted.audited,
         )  # fmt: skip
-        progress.stage("writing")
-        provenance = after_runs.provenance(scenario, started, wanted.command)
-        provenance["wall_s"] = time.perf_counter() - clock
-        return after_runs.write(scenario, output, wanted.formats, judged, provenance, audited=wanted.audited)

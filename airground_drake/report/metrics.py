@@ -42,7 +42,6 @@ NO_GAP = 1e-9  # a relative optimality gap up to this is a rounding error
 
 
 def of_run(trace: Trace) -> dict[str, Any]:
-    """Metrics of one run, as `model.Metrics` has them."""
     method = method_of(trace.meta["method"])
     wall_s = trace.timings.get("wall_s")
     duration_s = float(trace.t[-1] - trace.t[0])
@@ -187,7 +186,6 @@ def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
 
 
 def outcome(trace: Trace) -> dict[str, Any]:
-    """What came of a run, as `model.Seed` has it."""
     pairs = pairs_of(trace)
     bounds = apart_of(trace) - [pair.safe_m for pair in pairs]
     (k,) = least_of(bounds, 1, lambda k: least_gap(trace, pairs[k]).margin_m)
@@ -239,7 +237,6 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
 
 
 def _refusals(trace: Trace) -> dict[str, dict[str, int]]:
-    """How many proposals each robot refused at its first answer, by reason."""
     first = trace.decisions.drop_duplicates("number")
     refused = first[first["decision"] == "refuse"]
     return {
@@ -296,7 +293,6 @@ def gap_m(trace: Trace, robot: str, other: str) -> Array:
 
 
 def radius_m(trace: Trace, name: str) -> float:
-    """Radius of a robot or an obstacle, m."""
     return trace.scenario.bodies[name].radius_m
 
 
@@ -310,7 +306,6 @@ def _others(trace: Trace, robot: str) -> list[str]:
 
 
 def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
-    """Events of a robot, by time, of the given kinds."""
     return [event for event in trace.events if event["robot"] == robot and event["kind"] in kinds]
 
 
@@ -324,7 +319,6 @@ def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[st
 
 
 def _listed(trace: Trace, gaps: dict[str, Gap]) -> dict[str, dict[str, Any]]:
-    """Smallest gaps as report.json lists them."""
     return {
         other: {
             "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,

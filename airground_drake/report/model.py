@@ -269,7 +269,6 @@ def of(document: Any, source: str = "report.json") -> Report:
 
 
 def read(folder: Path) -> Report:
-    """The report.json of a folder."""
     path = folder / PAGES["json"]
     try:
         document = json.loads(files.read_text(path), parse_constant=_finite, parse_float=_finite, parse_int=_short)

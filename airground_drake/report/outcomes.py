@@ -32,12 +32,10 @@ class Near(NamedTuple):
 
     @property
     def whom(self) -> str:
-        """The other one in words."""
         return named(self.other, self.at_m)
 
     @property
     def is_short(self) -> bool:
-        """Whether the distance was not kept."""
         return self.margin_m < -SLACK_M
 
     def __str__(self) -> str:
@@ -54,7 +52,6 @@ class Near(NamedTuple):
 
 
 def pairs(run: Run) -> Iterator[Near]:
-    """The smallest distances of a run; two robots may be there twice."""
     for nearest in (run.metrics.min_distance_m, run.metrics.min_robot_distance_m):
         for robot, others in nearest.items():
             yield from (Near.between(robot, other, at) for other, at in others.items())

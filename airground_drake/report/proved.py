@@ -23,7 +23,6 @@ _PLACES = re.compile(r"<!--Coq on (\w+)-->.*?<!--end-->", re.DOTALL)
 
 
 def place(claim: Claim) -> Markup:
-    """The place of Coq's line about a claim; '' if Coq is not asked about that claim."""
     return _place(claim.run) if claim.id == DISTANCES else Markup("")
 
 
@@ -62,7 +61,6 @@ def filled(page: str, proofs: Mapping[str, Any]) -> str:
 
 
 def _line(entry: Mapping[str, Any], coq: str) -> Markup:
-    """What the page says of a run, an entry of proofs.json."""
     answer = entry["distances"]
     near = answer.get("too_near", ())
     if answer["proved"]:

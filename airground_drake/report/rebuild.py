@@ -193,7 +193,6 @@ def _taken(line: Line, why: str, applies: bool) -> Line:
 
 
 def _map(folder: Path, scenario: Any) -> Iterator[Line]:
-    """The cells of a map, made again from the copies of its files."""
     from airground_drake.report.folder import of_map
     from airground_drake.scenario import map_file
 
@@ -217,7 +216,7 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
     """The files that follow from report.json and the traces: pages, and what `airground prove` has added."""
     from airground_drake.report import junit, model, proved
     from airground_drake.report.figures.draw import draw
-    from airground_drake.report.page import page
+    from airground_drake.report.html import page
     from airground_drake.verify.proofs.runs import broken_rules
 
     made = model.of(report)
@@ -242,7 +241,6 @@ def _pages(folder: Path, report: Mapping[str, Any], scenario: Any, traces: Mappi
 
 
 def _same_text(name: str, folder: Path, rebuilt: str, *, other_drawings: bool = False) -> Line:
-    """Compare a file with the text that it should have: exactly, except for drawings."""
     recorded = files.read_text(folder / name)
     for k, (theirs, ours) in enumerate(zip_longest(_DRAWING.split(recorded), _DRAWING.split(rebuilt))):
         drawings = bool(k % 2) and theirs is not None and ours is not None

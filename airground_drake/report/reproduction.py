@@ -13,7 +13,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.report.metrics import closest_obstacle, events_of, gap_m
-from airground_drake.report.quantities import YES_NO
+from airground_drake.report.sentences import YES_NO
 from airground_drake.scenario.schema import Reproduction, Scenario
 from airground_drake.sim.collisions import first_collisions
 from airground_drake.sim.trace import Trace
@@ -27,24 +27,12 @@ TRIGGER_TOLERANCE_M = 1e-5
 SHIFTED_M = 0.1  # a path that leaves its straight line by this is shifted
 
 MEASURES: dict[str, Measure] = {}  # measures by name; `@measure` adds one
-# By measure, what the reason of a row tells of the run at hand; `@detail_of` adds one.
-DETAILS: dict[str, Callable[[Trace, str], list[str]]] = {}
 
 
 def measure(function: Measure) -> Measure:
     """Register a measure under its function's name (a decorator)."""
     MEASURES[function.__name__] = function
     return function
-
-
-def detail_of(*names: str) -> Callable[[Callable[[Trace, str], list[str]]], Callable[[Trace, str], list[str]]]:
-    """Register what to tell of a run about some measures (a decorator)."""
-
-    def register(function: Callable[[Trace, str], list[str]]) -> Callable[[Trace, str], list[str]]:
-        DETAILS.update(dict.fromkeys(names, function))
-        return function
-
-    return register
 
 
 @measure
@@ -141,7 +129,6 @@ def intervention_succeeds(trace: Trace, robot: str) -> list[float]:
     return [float(not _shortcomings(trace, robot))]
 
 
-@detail_of("intervention_succeeds")
 def _shortcomings(trace: Trace, robot: str) -> list[str]:
     """What an intervention lacks to succeed as in the paper."""
     triggers, accepted, refused = (_times(trace, robot, kind) for kind in ("trigger", "accept", "refuse"))
@@ -160,7 +147,6 @@ def acceptance_lasts(trace: Trace, robot: str) -> list[float]:
     return [float(not _taken_back(trace, robot))] if _times(trace, robot, "accept") else []
 
 
-@detail_of("acceptance_lasts")
 def _taken_back(trace: Trace, robot: str) -> list[str]:
     """What became of an acceptance that did not last."""
     accepted = _times(trace, robot, "accept")[:1]
@@ -188,16 +174,6 @@ def refused_proposal_time(trace: Trace, robot: str) -> list[float]:
     return _sent(trace, robot, "refuse")
 
 
-@detail_of("accepted_proposal_time")
-def _accepted(trace: Trace, robot: str) -> list[str]:
-    return [f"accepted at {_listed(times)}" for times in (_times(trace, robot, "accept")[:1],) if times]
-
-
-@detail_of("refused_proposal_time")
-def _refused(trace: Trace, robot: str) -> list[str]:
-    return [f"refused at {_listed(times)}" for times in (_times(trace, robot, "refuse")[:1],) if times]
-
-
 @measure
 def execution_time(trace: Trace, robot: str) -> list[float]:
     """Time at which an intervention is first executed, s."""
@@ -218,8 +194,18 @@ def collision_position(trace: Trace, robot: str) -> list[float]:
     return _planar(hits[0]["position_m"]) if hits else []
 
 
+# By measure, what the reason of a row tells of the run at hand.
+DETAILS: dict[str, Callable[[Trace, str], list[str]]] = {
+    "intervention_succeeds": _shortcomings,
+    "acceptance_lasts": _taken_back,
+    "accepted_proposal_time": lambda trace, robot: [
+        f"accepted at {t:.2f} s" for t in _times(trace, robot, "accept")[:1]
+    ],
+    "refused_proposal_time": lambda trace, robot: [f"refused at {t:.2f} s" for t in _times(trace, robot, "refuse")[:1]],
+}
+
+
 def rows(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
-    """The reproduction table, in the scenario's order: one JSON object per row."""
     return [_row(row, traces) for row in scenario.reproduction]
 
 

@@ -50,8 +50,8 @@ class Rule(NamedTuple):
 SAFE = (
     Rule(lambda run: run.collided, "no", "collision", kept=False),
     Rule(lambda run: run.is_broken, "no", "too close", kept=False),
-    Rule(lambda run: not run.distances_pass, "open", "not known", kept=False),
-    Rule(lambda run: run.untested, "none", "nothing came near: untested"),
+    Rule(lambda run: run.claim(DISTANCES).status not in PASSING, "open", "not known", kept=False),
+    Rule(lambda run: run.claim(DISTANCES).exercised == 0, "none", "nothing came near: untested"),
     Rule(lambda run: run.is_proved and run.movers, "yes", "distances kept, proved but for what moves"),
     Rule(lambda run: run.is_proved, "yes", "distances kept, proved"),
     Rule(lambda run: True, "yes", "distances kept, not proved"),
@@ -60,8 +60,8 @@ SAFE = (
 # Why a UGV did not arrive.
 CAUSES: tuple[tuple[Callable[[RunFacts, str], object], str], ...] = (
     (lambda run, robot: run.way(robot).kept_away, "{by} is at its target"),
-    (lambda run, robot: robot in run.failed, "the policy failed"),
-    (lambda run, robot: robot in run.lost, "no way found"),
+    (lambda run, robot: robot in [fault["robot"] for fault in run.run.faults], "the policy failed"),
+    (lambda run, robot: robot in run.run.no_way, "no way found"),
     (lambda run, robot: run.way(robot).left_s is not None, "{left_s:.2g} s to go"),
     (lambda run, robot: run.holders(robot), "held by {held_by}"),
     (lambda run, robot: run.refused_all(robot), "refused all proposals"),

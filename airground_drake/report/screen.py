@@ -6,14 +6,16 @@ Each cell is a mark and short lines; each line is one fact and needs no other li
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from textwrap import wrap
 from typing import NamedTuple
 
+from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
 from airground_drake.report.facts import RunFacts
 from airground_drake.report.model import Claim, Report
 from airground_drake.report.outcomes import Near
-from airground_drake.report.sentences import Line, counted, grouped
+from airground_drake.report.sentences import MARKS, Line, counted, grouped, some, unbroken
 from airground_drake.scenario.schema import Run
 from airground_drake.ugv.reasons import refusal
 
@@ -89,7 +91,6 @@ class FirstScreen(NamedTuple):
 
 
 def first_screen(report: Report) -> FirstScreen:
-    """The first screen of a report."""
     rows = _rows(report)
     checks = [*_seeds(report), *_zeno(report), *_threshold(report, rows), *_paper(report)]
     within = f"within {report.scenario.resolved.arrival_tolerance_m:g} m"
@@ -97,7 +98,6 @@ def first_screen(report: Report) -> FirstScreen:
 
 
 def _headline(rows: Sequence[Row]) -> list[Line]:
-    """What came of the best runs, and of the worst of the others."""
     main = sorted([row for row in rows if row.plain] or rows, key=lambda row: row.rank)
     collided = [row for row in rows if not row.plain and row.facts and row.facts.collided]
     rest = sorted((row for row in [*main, *collided] if row.clause != main[0].clause), key=lambda row: row.rank)
@@ -178,23 +178,17 @@ def _arrived(run: RunFacts) -> Cell:
     if not away:
         last = max((run.arrived_s.get(ugv, 0.0) for ugv in run.ugvs), default=0.0)
         astray = [uav for uav in run.uavs if uav not in run.home]
-        told = ["the UAV did not"] if astray == run.uavs else [f"{_named(astray)} did not"] if astray else []
+        told = ["the UAV did not"] if astray == run.uavs else [f"{some(astray, MOST_NAMES)} did not"] if astray else []
         return Cell("partly" if astray else "yes", [f"{count}, by {last:.1f} s", *told])
     goal = run.claim(rules.ARRIVAL)
     as_declared = " (as declared)" if goal.as_expected is True else ""
     ends = [*grouped((run.ending(ugv), ugv) for ugv in away).items()]
-    told = [f"{_named(who)} {how}" for how, who in ends]
+    told = [f"{some(who, MOST_NAMES)} {how}" for how, who in ends]
     rest = sum(len(who) for _, who in ends[MOST_ENDINGS:])
     more = [counted(rest, "more UGV")] if rest else []
     return Cell(
         "partly" if run.there or run.ends_too_early else "no", [count + as_declared, *told[:MOST_ENDINGS], *more]
     )
-
-
-def _named(names: Sequence[str]) -> str:
-    """Some names, and how many more."""
-    some = ", ".join(names[:MOST_NAMES])
-    return f"{some} and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else some
 
 
 def _uav(run: RunFacts) -> Cell:
@@ -290,7 +284,7 @@ def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
             says.append(f"at most {max(off_s, default=0.0):.2f} s off")
         above = list(dict.fromkeys(ugv for run in runs for ugv in run.run.metrics.above_at_start))
         if above:
-            says.append(f"{_named(above)} above it from the start")
+            says.append(f"{some(above, MOST_NAMES)} above it from the start")
         wrong = [run.name for run, claim in zip(runs, exact, strict=True) if claim.status == "refuted"]
         if wrong:
             says.append(f"{', '.join(wrong)}: not when the decision variable says")
@@ -300,7 +294,6 @@ def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
 
 
 def _verdict(those: Iterable[Claim]) -> str:
-    """The mark of some claims together."""
     statuses = {claim.status for claim in those}
     return "no" if "refuted" in statuses else "yes" if statuses and statuses <= {*PASSING} else "open"
 
@@ -326,7 +319,7 @@ def _beware(report: Report, rows: Sequence[Row]) -> list[str]:
     warnings = {
         "what is not known is fine: it was not checked": any(row.safe.mark == "open" for row in rows),
         "the UAV helps: it was never called": bool(helped) and not any(run.triggers for run in helped),
-        f"robots can keep away from {_named(movers)}: what moves comes as near as it likes": bool(movers),
+        f"robots can keep away from {some(movers, MOST_NAMES)}: what moves comes as near as it likes": bool(movers),
         f"distances are kept elsewhere, too ({', '.join(seen)}): this is not proved": bool(seen),
     }
     told = [says for says, applies in warnings.items() if applies]
@@ -367,3 +360,45 @@ def declared(report: Report) -> Cell:
         told.append(f"{counted(more, 'more check')}: nothing is promised")
     mark = {"as_expected": "yes", "not_as_expected": "no"}.get(overall.status, "open")
     return Cell(mark, told)
+
+
+WIDTH = 100  # characters of a line
+# Widths of the columns of runs, and of questions and answers; two blanks are between columns.
+COLUMNS, ANSWERS = (20, 29, 23, 22), (18, 80)
+
+
+def text(report: Report) -> str:
+    screen = first_screen(report)
+    lines = []
+    for mark, told in screen.headline:
+        lines += wrap(one_line(f"[{MARKS[mark].icon}] {told}"), WIDTH, subsequent_indent="    ")
+    titles = ("Run", "Safe? (nearest approach)", f"Arrived? ({screen.within})", "UAV proposals")
+    runs = [[Cell("", [title]) for title in titles]]
+    runs += [[Cell("", [f"{row.run}: {row.says}"]), row.safe, row.arrived, row.uav] for row in screen.rows]
+    below = [(check.question, Cell(check.mark, [check.told])) for check in screen.checks]
+    below += [("Do not conclude", Cell("", [f"that {warning}" for warning in screen.beware]))]
+    below += [("As declared?", screen.declared)]
+    asked = [question for question, _ in below]
+    first = [question if question not in asked[:k] else "" for k, question in enumerate(asked)]
+    answers = [[Cell("", [question]), cell] for question, (_, cell) in zip(first, below, strict=True)]
+    return "\n".join([*lines, "", *_table(runs, COLUMNS), "", *_table(answers, ANSWERS)])
+
+
+def _table(rows: Sequence[Sequence[Cell]], widths: Sequence[int]) -> list[str]:
+    """Columns of these widths; cells are wrapped, and stand under the text of their first line, after the mark."""
+    told = []
+    for row in rows:
+        cells = [_wrapped(cell, width) for cell, width in zip(row, widths, strict=True)]
+        for k in range(max(map(len, cells))):
+            parts = ((cell[k] if k < len(cell) else "").ljust(width) for cell, width in zip(cells, widths, strict=True))
+            told.append("  ".join(parts).rstrip())
+    return told
+
+
+def _wrapped(cell: Cell, width: int) -> list[str]:
+    indent = "  " if cell.mark else ""
+    lines = []
+    for k, line in enumerate(cell.lines):
+        begin = f"{MARKS[cell.mark].icon} " if cell.mark and not k else indent
+        lines += wrap(unbroken(one_line(line)), width, initial_indent=begin, subsequent_indent=f"{indent}  ")
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]

@@ -74,7 +74,6 @@ def _line(claim: str, run: str, difference: Difference | None, exactly: str, not
 def _third_party(
     claims: Sequence[Mapping[str, Any]], scenario: Scenario, traces: Mapping[str, Trace], note: str
 ) -> Iterator[Line]:
-    """The verdicts of the claims that the scenario adds, judged again."""
     verdicts = judge_all(scenario, traces.values(), claims=scenario.claims)
     made = {(verdict.claim.id, verdict.run): json.loads(json.dumps(verdict.to_json())) for verdict in verdicts}
     recorded = {(claim["id"], claim["run"]): dict(claim) for claim in claims if claim["id"] in scenario.claims}

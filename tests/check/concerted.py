@@ -51,8 +51,8 @@ from airground_drake.check.line import AGREES, RECORDED
 from airground_drake.report import junit, proved, rebuild, simulated
 from airground_drake.report.__main__ import main as write_report
 from airground_drake.report.figures import draw as drawing
+from airground_drake.report.html import page
 from airground_drake.report.model import of
-from airground_drake.report.page import page
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.plugins import OPTION
 from airground_drake.sim.trace import load

@@ -234,7 +234,7 @@ replay report -o x.html                 # x.html is one file for the runs c, d; 
 replay report d --video report/d.webp   # is in the report
 replay report d --video d.avi           # allowed: names that end in .webp or .mp4
 replay report --video x.webp            # --video needs a RUN
-replay report d --video x.webp --live   # not allowed with
+replay report d --video x.webp -o y   # not allowed with
 replay report d --video x.webp --speed nan # a number from 0.1 to 100
 replay report d --speed 2               # --speed needs --video
 figures spec.yaml                       # is not a report

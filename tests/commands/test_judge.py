@@ -13,7 +13,7 @@ import yaml
 from builders import logs
 from commands.conftest import Airground
 
-from airground_drake.report.export import recording, tables
+from airground_drake.report.export import recording
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
@@ -86,7 +86,7 @@ def test_what_the_package_exports_is_judged_like_the_run(
         judged_by = (tmp_path / "lab.yaml").as_posix()
         (tmp_path / "lab.yaml").write_text(yaml.safe_dump(given))
         trace = simulate(load(judged_by), "a")
-    *_, least = tables.write(trace, tmp_path)
+    *_, least = recording.write(trace, tmp_path)
     if kind == "csv":
         path = tmp_path / f"{trace.run}_states.csv"
     else:

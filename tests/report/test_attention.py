@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from report.cases import FINE, built, verdict
 
-from airground_drake.report import attention, phrases
+from airground_drake.report import attention
 from airground_drake.report.model import of
 from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Scenario
@@ -112,7 +112,7 @@ def test_for_whom_the_uav_finds_no_way_any_more() -> None:
     assert "the UAV found no way for ugv1: no plan exists: on the UAV's map, ugv1 cannot come to the target" in found
 
 
-KEYS = st.sampled_from([*phrases.ROLES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])
+KEYS = st.sampled_from([*attention.ROLES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])
 VALUES = st.none() | st.booleans() | st.floats() | st.text() | st.sampled_from(["ugv1", "uav", "obstacle_1"])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from airground_drake.report import make, terminal
+from airground_drake.report import make, screen
 from airground_drake.report.__main__ import main
 from airground_drake.report.model import of
 from airground_drake.scenario.load import load, shipped
@@ -32,7 +32,7 @@ def test_everything_is_written_and_the_readme_shows_the_first_screen(report: Rep
     for name in load("case_a").runs:
         assert trace.load(folder / "trace" / name).run == name
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert re.findall(r"```text\n(.*?)```", readme, re.DOTALL) == [terminal.text(of(document_of(folder))) + "\n"]
+    assert re.findall(r"```text\n(.*?)```", readme, re.DOTALL) == [screen.text(of(document_of(folder))) + "\n"]
 
 
 def test_the_reproduction_table_meets_its_targets(report: Report) -> None:

@@ -5,7 +5,7 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.report import evidence
+from airground_drake.report import html
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -16,13 +16,13 @@ JSON = st.recursive(
 
 def test_names_of_keys_in_words() -> None:
     keys = ("min_distance_m", "gain_1_s", "speed_m_s", "noise_m_sqrt_s", "refuse_outcome_m2_s", "pairs", "m")
-    assert [evidence.in_words(key) for key in keys] == [
+    assert [html.in_words(key) for key in keys] == [
         "min distance, m", "gain, 1/s", "speed, m/s", "noise, m/√s", "refuse outcome, m²s", "pairs", "m",
     ]  # fmt: skip
 
 
 def test_values_records_and_records_by_name() -> None:
-    found = evidence.tables(
+    found = html.tables(
         {
             "tolerance_m": 0.125,
             "agrees": True,
@@ -40,14 +40,14 @@ def test_values_records_and_records_by_name() -> None:
 
 
 def test_long_tables_and_long_cells_are_cut() -> None:
-    rows, cell = evidence.tables({"rows": [{"x": k} for k in range(90)], "y": "y" * 500}, "X")[::-1]
-    assert len(rows.rows) == evidence.MAX_ROWS
+    rows, cell = html.tables({"rows": [{"x": k} for k in range(90)], "y": "y" * 500}, "X")[::-1]
+    assert len(rows.rows) == html.MAX_ROWS
     assert "50 more rows" in rows.caption
     assert cell.rows[0][1].endswith("…")
 
 
 @given(st.dictionaries(st.text(), JSON, max_size=5))
 def test_any_json_is_shown(found: dict[str, object]) -> None:
-    for table in evidence.tables(json.loads(json.dumps(found)), "X"):
+    for table in html.tables(json.loads(json.dumps(found)), "X"):
         assert all(len(row) == len(table.columns) for row in table.rows)
         assert all(isinstance(cell, str) for row in table.rows for cell in row)

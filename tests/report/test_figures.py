@@ -16,7 +16,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from report.cases import FLIGHT, event, make_scenario, make_trace
 
-from airground_drake.report.figures import clock, draw, maps, timelines
+from airground_drake.report.figures import draw, maps, timelines
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.view import canvas, labels, svg
 from airground_drake.report.view.plane import frame_of, thumbnail_of
@@ -162,10 +162,10 @@ def test_times_of_events_are_written(drawn: list[Figure]) -> None:
 
 @given(st.lists(st.floats(0.0, 100.0), max_size=30))
 def test_time_is_left_out_only_where_nothing_happens(times: list[float]) -> None:
-    shown = clock.Clock.around(times, 0.0, 100.0)
+    shown = timelines.Clock.around(times, 0.0, 100.0)
     assert shown.shows(np.array(times)).all()
-    assert len(shown.begin) <= clock.MAX_CUTS + 1
-    assert (shown.begin[1:] - shown.end[:-1] >= clock.CUT_S).all()
+    assert len(shown.begin) <= timelines.MAX_CUTS + 1
+    assert (shown.begin[1:] - shown.end[:-1] >= timelines.CUT_S).all()
     every = np.sort([*times, *shown.begin, *shown.end])
     assert (np.diff(shown.at(every)) >= 0.0).all()
     assert shown.length == pytest.approx(shown.at([100.0])[0])

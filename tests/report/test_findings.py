@@ -9,7 +9,7 @@ from airground_drake.report.audit.formulas import formula_findings
 from airground_drake.report.audit.runs import findings as findings_of_runs
 from airground_drake.report.audit.thresholds import threshold_findings
 from airground_drake.report.figures import findings
-from airground_drake.report.figures.lines import of_finding
+from airground_drake.report.figures.findings import of_finding
 from airground_drake.report.view import canvas
 from airground_drake.scenario.load import load
 from airground_drake.study.testing.plugin import Simulations

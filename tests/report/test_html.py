@@ -13,11 +13,11 @@ from pydantic import BaseModel
 from report.cases import FINE, Kept, built, event, make_scenario, make_trace, make_traces, verdict
 
 from airground_drake.base.statuses import STATUSES
-from airground_drake.report import attention, document, html, quantities
+from airground_drake.report import attention, document, html, sentences
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
+from airground_drake.report.html import page as page_of
 from airground_drake.report.model import of
-from airground_drake.report.page import page as page_of
 from airground_drake.scenario.schema import Run, Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Verdict
@@ -247,13 +247,13 @@ def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() 
 
 
 def test_values_for_reading() -> None:
-    assert [quantities.number(x) for x in (None, 14.0, -0.21984, 2.5e-14)] == [
+    assert [sentences.number(x) for x in (None, 14.0, -0.21984, 2.5e-14)] == [
         "\N{EN DASH}", "14", "\N{MINUS SIGN}0.2198", "2.5e\N{MINUS SIGN}14",
     ]  # fmt: skip
-    assert [quantities.told(*x) for x in (([3.3, 5.1], "m"), (1.0, "yes/no"), (None, "m"))] == [
+    assert [sentences.told(*x) for x in (([3.3, 5.1], "m"), (1.0, "yes/no"), (None, "m"))] == [
         "(3.3, 5.1) m", "yes", "\N{EN DASH}",
     ]  # fmt: skip
-    assert quantities.told({"gap_m": 0.5, "there": True}) == "gap 0.5 m; there yes"
+    assert sentences.told({"gap_m": 0.5, "there": True}) == "gap 0.5 m; there yes"
     data = {"a": [{"x": 1.5, "long": "y" * 90}, {"x": None}], "b": "\u202e"}
     assert yaml.safe_load(html.as_yaml(data)) == data
     assert html.as_yaml(data).isascii()

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from airground_drake.report import document
+from airground_drake.report.attention import bodies_of
 from airground_drake.report.facts import RunFacts
 from airground_drake.report.model import Report, of
-from airground_drake.report.phrases import bodies_of
 from airground_drake.report.screen import Row, first_screen
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.shapes import corners_of_map

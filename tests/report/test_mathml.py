@@ -2,8 +2,8 @@
 
 import xml.etree.ElementTree as ET
 
-from airground_drake.report.audit.typeset import FORMULAS
-from airground_drake.report.mathml import mathml
+from airground_drake.report.audit.item import FORMULAS
+from airground_drake.report.html import mathml
 from airground_drake.verify.registry import model_claims, run_claims
 
 

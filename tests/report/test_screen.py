@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from airground_drake.base.statuses import PASSING, STATUSES
-from airground_drake.report import html, terminal
+from airground_drake.report import html, screen
 from airground_drake.report.model import SCHEMA, of
 from airground_drake.report.screen import FirstScreen, Row, first_screen
 
@@ -403,6 +403,6 @@ def test_whatever_the_verdicts_nothing_untrue_is_said(edits: list[Edit]) -> None
     for seed in range(120):
         found = shaken(document(*edits, methods="abcd"), seed)
         require_true(found, screen_of(found))
-        assert max(map(len, terminal.text(of(found)).splitlines())) <= terminal.WIDTH
+        assert max(map(len, screen.text(of(found)).splitlines())) <= screen.WIDTH
     template = html.environment().get_template("first.html.j2")
     assert 'class="headline' in template.render(first=screen_of(found), linked={}, sections=[])

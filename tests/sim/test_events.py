@@ -17,7 +17,7 @@ from properties import examples
 
 from airground_drake.model.bodies.motion import PeriodMotion
 from airground_drake.model.geometry.outline import balls
-from airground_drake.report.replay.proposals import sent
+from airground_drake.report.replay.scene import sent
 from airground_drake.scenario.schema import Obstacle
 from airground_drake.sim import events
 from airground_drake.sim.trace import Trace

@@ -7,7 +7,7 @@ import pytest
 
 from airground_drake.sim.batch.run import Batch, Going
 from airground_drake.sim.trace import Trace
-from airground_drake.study.campaign.screening import happened, happened_in
+from airground_drake.study.campaign.work import happened, happened_in
 from airground_drake.verify import TRACE_CLAIMS, Finding, Verdict
 from airground_drake.verify.array_judges import SAME, ArrayJudges
 from airground_drake.verify.claim import ModelClaim

@@ -7,8 +7,8 @@ scenarios or on formulas alone: `python -m airground_drake.report audit`.
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from airground_drake.report.audit.item import typeset
 from airground_drake.report.audit.runs import findings
-from airground_drake.report.audit.typeset import typeset
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import Verdict
@@ -24,8 +24,7 @@ def of_runs(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, A
 def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
     """All findings but those of the scenario's own runs."""
     from airground_drake.report.audit.companions import companion_findings  # imports Drake
-    from airground_drake.report.audit.formulas import formula_findings
-    from airground_drake.report.audit.readings import reading_findings
+    from airground_drake.report.audit.formulas import formula_findings, reading_findings
     from airground_drake.report.audit.thresholds import threshold_findings
 
     proofs = {verdict.claim.id: verdict for verdict in verdicts if not verdict.run}

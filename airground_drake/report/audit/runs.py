@@ -19,7 +19,6 @@ REFERENCE_POINTS = 121  # points of the reference's way that a finding keeps for
 
 
 def findings(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Item]:
-    """Audit items with evidence in these runs."""
     return [item for item in (_recursion(scenario, traces), _timing(scenario, traces)) if item]
 
 
@@ -69,7 +68,6 @@ def _stalls(entries: Sequence[Mapping[str, Any]]) -> bool:
 
 
 def _did(entries: Sequence[Mapping[str, Any]], d: float) -> str:
-    """What runs did, in words."""
     margin_m = _least(entries)
     short = f"comes {-margin_m:.3g} m inside the safe distance of {d:g} m"
     kept = short if margin_m < -1e-9 else f"keeps the safe distance of {d:g} m"

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.statuses import PASSING, outcome
+from airground_drake.base.statuses import NOT_EXERCISED, PASSING, outcome
 from airground_drake.report import rules
-from airground_drake.report.export import latex
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.model import Report
+from airground_drake.report.sentences import told
 from airground_drake.report.view import canvas
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
@@ -27,6 +27,13 @@ WIDTHS = {"ieee": r"\columnwidth", "thesis": r"0.7\linewidth"}  # width of a fig
 # Metadata without a date, by format, so that the same run gives the same file.
 UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 _COMMON = {"savefig.dpi": 300, "pdf.fonttype": 42}
+_SPECIAL = {
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}",
+    ">": r"\textgreater{}", "|": r"\textbar{}", **{character: f"\\{character}" for character in "&%$#_{}"},
+    "○": r"$\circ$", "●": r"$\bullet$", "\N{MULTIPLICATION SIGN}": r"$\times$", "✖": r"$\times$", "□": r"$\square$",
+    "◆": r"$\blacklozenge$", "▲": r"$\blacktriangle$", "▼": r"$\blacktriangledown$", "…": r"\ldots{}",
+    "\N{MINUS SIGN}": "$-$", "\N{EN DASH}": "--",
+}  # fmt: skip
 
 
 def write(
@@ -51,9 +58,9 @@ def write(
                 files.write_bytes(folder / f"{names[-1]}.{kind}", buffer.getvalue())
                 yield folder / f"{names[-1]}.{kind}"
         texts.append(_environment(figure, names, WIDTHS[style], report))
-    tables = {"verdicts.tex": latex.verdicts(report)}
+    tables = {"verdicts.tex": verdicts(report)}
     if report.reproduction:
-        tables["reproduction.tex"] = latex.reproduction(report)
+        tables["reproduction.tex"] = reproduction(report)
     for name, text in {"figures.tex": "\n".join(texts), **tables}.items():
         files.write_text(folder / name, text)
         yield folder / name
@@ -63,7 +70,7 @@ def _environment(figure: Figure, names: Sequence[str], width: str, report: Repor
     """A figure in LaTeX: its panels, narrow ones side by side, and a caption that says what is established."""
     across, width = ("figure*", r"\textwidth") if figure.look == "wide" else ("figure", width)
     panels = [rf"  \includegraphics[width={width}]{{{name}}}\\" for name in names]
-    caption = latex.escaped(" ".join([figure.caption, *_established(rules.CAPTIONS.get(figure.id, ()), report)]))
+    caption = escaped(" ".join([figure.caption, *_established(rules.CAPTIONS.get(figure.id, ()), report)]))
     lines = [
         rf"\begin{{{across}}}",
         r"  \centering",
@@ -86,3 +93,36 @@ def _established(claims: Sequence[str], report: Report) -> Iterator[str]:
             noun = "runs" if len(runs) > 1 else "run"
             where = f" in {noun} {', '.join(runs)}" if any(runs) else ""
             yield f"{name} {status if status == 'holds' else f'is {status}'}{where}."
+
+
+def escaped(text: str) -> str:
+    """Text as LaTeX shows it, with the packages amssymb and booktabs; a line break becomes a space."""
+    return "".join(_SPECIAL.get(character, character) for character in " ".join(text.split()))
+
+
+def verdicts(report: Report) -> str:
+    # "not tested" stands for a verdict that nothing could have refuted.
+    statuses_by_claim: dict[str, dict[str, str]] = {}
+    for claim in report.claims:
+        status = outcome(claim.status, claim.exercised)
+        shown = "not tested" if status == NOT_EXERCISED else status
+        statuses_by_claim.setdefault(claim.id, {})[claim.run] = shown
+    runs = list(report.runs)
+    rows = [[name, *(statuses.get(run, "") for run in ("", *runs))] for name, statuses in statuses_by_claim.items()]
+    return _table(["claim", "model", *runs], "l" * (2 + len(runs)), rows)
+
+
+def reproduction(report: Report) -> str:
+    rows = [
+        [row.id, row.quantity, told(row.paper, row.unit), told(row.ours, row.unit), row.status.replace("_", " ")]
+        for row in report.reproduction
+    ]
+    return _table(["", "quantity", "paper", "ours", ""], r"lp{0.45\linewidth}lll", rows)
+
+
+def _table(head: Sequence[str], columns: str, rows: Sequence[Sequence[str]]) -> str:
+    lines = [" & ".join(map(escaped, row)) + r" \\" for row in (head, *rows)]
+    body = "\n".join(lines[1:])
+    return (
+        f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n{lines[0]}\n\\midrule\n{body}\n\\bottomrule\n\\end{{tabular}}\n"
+    )

@@ -1,19 +1,37 @@
-"""A run as an MCAP file, for Foxglove and other readers: robots, obstacles, signals and events."""
+"""A run as an MCAP file, for Foxglove and other readers, or as CSV files, one per table of the trace."""
 
 from __future__ import annotations
 
 import io
 import json
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+import pandas as pd
+
+from airground_drake.base import files
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ExportError
 from airground_drake.report.view.geometry import Mesh, prisms
-from airground_drake.report.view.looks import OBSTACLE_COLOR, SAFE_COLOR, STATE_COLORS, UAV_COLOR, UNSEEN_COLOR, rgb
-from airground_drake.report.view.stage import Barrier, Robot, Stage, stage_of, states
+from airground_drake.report.view.stage import (
+    OBSTACLE_COLOR,
+    SAFE_COLOR,
+    STATE_COLORS,
+    UAV_COLOR,
+    UNSEEN_COLOR,
+    Barrier,
+    Robot,
+    Stage,
+    rgb,
+    stage_of,
+    states,
+)
 from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.tables import TABLES
 from airground_drake.sim.trace import Trace
+from airground_drake.verify.runs.pairs import least_gap, pairs_of
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -101,7 +119,6 @@ def _write(writer: Writer, messages: list[Message]) -> None:
 
 
 def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
-    """All messages of a run."""
     standing = stage_of(trace, scenario)
     yield Message(0.0, "/scene", "foxglove.SceneUpdate", {"deletions": [], "entities": list(_standing(standing))})
     looks = {robot: states(trace, robot, trace.t) for robot in trace.ugvs}
@@ -124,7 +141,6 @@ def _messages(trace: Trace, scenario: Scenario) -> Iterator[Message]:
 
 
 def _signals(trace: Trace, robot: str, k: int) -> dict[str, Any]:
-    """Signals of a robot in row k of the trace."""
     signals: dict[str, Any] = {
         "position_m": _vector(trace.body(robot)[k].tolist()),
         "command_m_s": _vector(trace.command(robot)[k].tolist()),
@@ -208,3 +224,30 @@ def _rgba(color: str, alpha: float = 1.0) -> dict[str, float]:
 def _time(t_s: float) -> dict[str, int]:
     sec, nsec = divmod(round(t_s * 1e9), 10**9)
     return {"sec": sec, "nsec": nsec}
+
+
+# Columns under the names that say what they are, by their names in a trace.
+TOLD = {"distances_m": "distances_of_centres_m"}
+
+
+def write(trace: Trace, folder: Path) -> Iterator[Path]:
+    """Write the tables, the events and the smallest distances of a run, `RUN_TABLE.csv`."""
+    # Distances are between surfaces, below 0 as an overlap. Numbers are written so that they read back equal.
+    tables: dict[str, pd.DataFrame] = {name: getattr(trace, name) for name in TABLES}
+    tables["events"] = pd.DataFrame(trace.events)
+    least = [least_gap(trace, pair) for pair in pairs_of(trace)]
+    tables["distances"] = pd.DataFrame([
+        {"first": at.pair.first, "second": at.pair.second, "min_distance_m": at.gap_m,
+         "safe_distance_m": at.pair.required_m, "t_s": at.t_s} for at in least
+    ])  # fmt: skip
+    for name, table in tables.items():
+        path = folder / f"{trace.run}_{name}.csv"
+        files.write_text(path, table.rename(columns=TOLD).map(_cell).to_csv(index=False))
+        yield path
+
+
+def _cell(value: Any) -> Any:
+    """A list or an array as JSON text, anything else as it is."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    return json.dumps(value) if isinstance(value, list) else value

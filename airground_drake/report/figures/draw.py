@@ -15,7 +15,6 @@ from airground_drake.base.registry import method_of
 from airground_drake.report.figures import findings, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
 from airground_drake.report.metrics import close_by, events_of, gap_m, radius_m
-from airground_drake.report.outcomes import Near
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.rules import SETTINGS
 from airground_drake.report.view import canvas
@@ -132,7 +131,6 @@ def _heading(group: list[str], runs: Mapping[str, Trace], scenario: Scenario) ->
 
 
 def _runs(heading: str) -> str:
-    """The part of a heading that names its runs."""
     return heading.partition(":")[0]
 
 
@@ -179,7 +177,6 @@ def _trajectories(chosen: _Selection) -> Figure:
 
 
 def _points(trace: Trace, robots: list[str], marks: Sequence[maps.Mark]) -> Table:
-    """Starts, what happened where, and ends."""
     starts, ends = (
         [(r, trace.t[k], word, trace.body(r)[k, :2]) for r in robots] for k, word in ((0, "starts"), (-1, "ends"))
     )
@@ -205,7 +202,9 @@ def _distances(chosen: _Selection) -> Figure | None:
     for heading, trace, ugvs in [(*run, ugvs) for run in chosen.shown.items() for ugvs in columns if ugvs]:
         of_ugvs = {ugv: near[heading, ugv] for ugv in ugvs}
         gaps = {f"{ugv} to {at.other}": gap_m(trace, ugv, at.other) for ugv, those in of_ugvs.items() for at in those}
-        smallest = "; ".join(f"{ugv} {_told(those[0])}" for ugv, those in of_ugvs.items() if those)
+        smallest = "; ".join(
+            f"{ugv} {those[0]} to {those[0].whom} at {those[0].t_s:.2f} s" for ugv, those in of_ugvs.items() if those
+        )
         drawing = timelines.distances(trace, of_ugvs, looks, top)
         table = series(trace, "Distances, m", gaps)
         says = f"Smallest distances: {smallest}."
@@ -221,10 +220,6 @@ def _distances(chosen: _Selection) -> Figure | None:
         f"Circle: the smallest distance, exact; red: too small.{_left_out(chosen, chosen.ugvs)}"
     )
     return Figure("distances", "Distances to the nearest obstacles and robot", caption, tuple(panels))
-
-
-def _told(at: Near) -> str:
-    return f"{at} to {at.whom} at {at.t_s:.2f} s"
 
 
 def _timelines(chosen: _Selection) -> Figure:

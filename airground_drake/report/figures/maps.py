@@ -183,7 +183,6 @@ def plane(trace: Trace, ugvs: Sequence[str], frame: Frame, key: Sequence[Entry],
 
 
 def _draw(axes: Axes, marks: Sequence[Mark]) -> None:
-    """Marks where they are, and proposed paths."""
     for mark in marks:
         of_mark = dict(LOOKS[mark.kind])
         dash = of_mark.pop("linestyle", "none")

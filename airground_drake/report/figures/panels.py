@@ -53,9 +53,8 @@ def panel(drawing: Drawing, name: str, title: str, says: str, heading: str, tabl
 def series(trace: Trace, caption: str, columns: Mapping[str, Array]) -> Table:
     """A few dozen rows of columns (T,), evenly spread over the run; a cell is empty where there is no value."""
     rows = np.unique(np.linspace(0, len(trace.t) - 1, MAX_TABLE_ROWS).round().astype(int))
-    cells = tuple((f"{trace.t[k]:.2f}", *(_cell(values[k]) for values in columns.values())) for k in rows)
+    cells = tuple(
+        (f"{trace.t[k]:.2f}", *("" if np.isnan(values[k]) else f"{values[k]:.3f}" for values in columns.values()))
+        for k in rows
+    )
     return Table(f"Run {trace.run}: {caption}", ("t, s", *columns), cells)
-
-
-def _cell(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.3f}"

@@ -1,22 +1,42 @@
 """All that a replay shows: positions and states of the robots at each frame, proposals and events, from the trace."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.registry import method_of
-from airground_drake.report.replay.proposals import Sent, sent
+from airground_drake.report.interventions import interventions
 from airground_drake.report.view.stage import Robot, Stage, stage_of, states
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
+from airground_drake.verify.runs.proposals import proposal_of
 
 FRAMES_PER_S = 30  # frames in a second of simulated time
 
 MAX_NAMED_BARRIERS = 8  # with more barriers, their names are not shown
+Outcome = Literal["asked", "accepted", "refused"]
+LINGER_S = 1.0  # time for which a refused or unanswered proposal is shown, s
+
+
+class Span(NamedTuple):
+    """A time interval, s, in which a proposal has one outcome."""
+
+    start_s: float
+    end_s: float
+    outcome: Outcome
+
+
+class Sent(NamedTuple):
+    """A proposal: its UGV, its policy, the corners of its motion (M, 3), m, and its outcomes over time."""
+
+    robot: str
+    policy: str
+    path: Array
+    spans: tuple[Span, ...]
 
 
 @dataclass(frozen=True)
@@ -49,7 +69,6 @@ class Scene(Stage):
 
 
 def scene(trace: Trace, scenario: Scenario) -> Scene:
-    """The scene of a run."""
     times = frame_times(trace.t)
     still = stage_of(trace, scenario)
 
@@ -85,3 +104,23 @@ def scene(trace: Trace, scenario: Scenario) -> Scene:
 def frame_times(t: Array) -> Array:
     """Times of the frames, (F,), s, from 0 to the end of a run with rows at times (T,), s."""
     return np.minimum(np.arange(np.ceil(t[-1] * FRAMES_PER_S - 1e-6) + 1) / FRAMES_PER_S, t[-1])
+
+
+def sent(trace: Trace) -> tuple[Sent, ...]:
+    return tuple(
+        Sent(became["robot"], became["policy"], proposal_of(trace, became["number"]).positions_m, tuple(_spans(became)))
+        for became in interventions(trace)
+    )
+
+
+def _spans(became: Mapping[str, Any]) -> Iterator[Span]:
+    """Asked until it is accepted or ends; accepted until it ends; refused for a while, if that was the end."""
+    accepted_s, end_s, how = became["accepted_s"], became["ended"]["t_s"], became["ended"]["how"]
+    refused = how in ("refused", "given up")
+    if accepted_s is not None:
+        yield Span(became["sent_s"], accepted_s, "asked")
+        yield Span(accepted_s, end_s, "accepted")
+    else:
+        yield Span(became["sent_s"], end_s if refused else min(end_s, became["sent_s"] + LINGER_S), "asked")
+    if refused:
+        yield Span(end_s, end_s + LINGER_S, "refused")

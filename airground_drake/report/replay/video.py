@@ -14,13 +14,11 @@ from matplotlib.patches import Circle
 from airground_drake.base import files
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ReplayError
-from airground_drake.report.replay.proposals import Sent
-from airground_drake.report.replay.scene import DrawnBody, Scene
+from airground_drake.report.replay.scene import DrawnBody, Scene, Sent
 from airground_drake.report.view import canvas
 from airground_drake.report.view.labels import place
-from airground_drake.report.view.looks import OUTCOME_COLORS, PATH_COLOR, STATE_COLORS, STATE_MARKS, UAV_COLOR
 from airground_drake.report.view.plane import draw_barriers, draw_robot
-from airground_drake.report.view.stage import Barrier
+from airground_drake.report.view.stage import OUTCOME_COLORS, PATH_COLOR, STATE_COLORS, STATE_MARKS, UAV_COLOR, Barrier
 from airground_drake.scenario.schema import Scenario
 
 PICTURES_PER_S = 15  # pictures in a second of the video
@@ -56,7 +54,6 @@ def write(scene: Scene, path: Path, speed: float) -> None:
 
 
 def _encoder(path: Path) -> AbstractMovieWriter:
-    """The encoder for a file, by its name."""
     if path.suffix not in SUFFIXES:
         raise ReplayError(f"{path}: no video of this kind; allowed: names that end in {' or '.join(SUFFIXES)}")
     if path.suffix == ".webp":

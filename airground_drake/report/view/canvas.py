@@ -82,7 +82,6 @@ DARK = {
 
 
 def look(position: int) -> Look:
-    """The look of the line at a position."""
     return LOOKS[position % len(LOOKS)]
 
 
@@ -135,7 +134,6 @@ def interval(values: Array) -> tuple[float, float]:
 
 
 def time_line(axes: Axes, t: Array, values: Array, appearance: Look, **options: Any) -> None:
-    """A line over time with sparse markers."""
     rows = thin(values)
     axes.plot(
         t[rows], values[rows], color=appearance.color, linestyle=appearance.dash, marker=appearance.marker,
@@ -144,7 +142,6 @@ def time_line(axes: Axes, t: Array, values: Array, appearance: Look, **options: 
 
 
 def level(axes: Axes, value: float, dash: Any) -> None:
-    """A horizontal reference line."""
     axes.axhline(value, color=INK, linestyle=dash, linewidth=1.0)
 
 
@@ -152,15 +149,11 @@ def label_right(axes: Axes, labels: Sequence[tuple[float, str, str]]) -> None:
     """Labels (value, text, colour) right of the axes, at their values if there is room."""
     bottom, top = axes.get_ylim()
     order = sorted(range(len(labels)), key=lambda k: labels[k][0])
-    places = spread([(labels[k][0] - bottom) / (top - bottom) for k in order], line_gap(axes))
+    line = 1.25 * _FONT_PT / _POINTS_PER_INCH / size_in(axes)[1]  # between lines of text, as a share of the height
+    places = spread([(labels[k][0] - bottom) / (top - bottom) for k in order], line)
     for k, place in zip(order, places, strict=True):
         _, text, color = labels[k]
         axes.text(1.015, place, text, color=color, transform=axes.transAxes, va="center", ha="left", clip_on=False)
-
-
-def line_gap(axes: Axes) -> float:
-    """Distance between lines of text, as a share of the axes' height."""
-    return 1.25 * _FONT_PT / _POINTS_PER_INCH / size_in(axes)[1]
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:
@@ -214,7 +207,6 @@ def _number(at: float, *, log: bool) -> str:
 
 
 def size_in(axes: Axes) -> tuple[float, float]:
-    """Width and height of the axes, inches."""
     figure, box = axes.get_figure(root=True), axes.get_position(original=True)
     width_in, height_in = figure.get_size_inches() if isinstance(figure, Figure) else (1.0, 1.0)
     return box.width * width_in, box.height * height_in

@@ -9,16 +9,21 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import ReplayError
 from airground_drake.report.view.geometry import camera, grid, prisms
-from airground_drake.report.view.looks import (
+from airground_drake.report.view.stage import (
+    FINE,
     OBSTACLE_COLOR,
     PATH_COLOR,
     SAFE_COLOR,
     STATE_COLORS,
+    STATES,
+    TRIGGERED,
     UAV_COLOR,
     UNSEEN_COLOR,
+    Barrier,
+    Robot,
+    Stage,
     rgb,
 )
-from airground_drake.report.view.stage import FINE, STATES, TRIGGERED, Barrier, Robot, Stage
 
 ELEVATION = np.radians(58.0)
 # Tops of safe zones that overlap differ by up to this share of their height: the higher one hides the lower one.
@@ -72,7 +77,6 @@ def barrier_path(k: int) -> str:
 
 
 def rgba(color: str, alpha: float = 1.0) -> Rgba:
-    """Drake's form of a colour #rrggbb."""
     return Rgba(*rgb(color), alpha)
 
 
@@ -84,7 +88,6 @@ def _cylinder(
 
 
 def _ground(meshcat: Meshcat, stage: Stage) -> None:
-    """Ground and camera."""
     for path in ("/Grid", "/Axes"):
         meshcat.SetProperty(path, "visible", False)
     for edge, shade in (("top_color", [0.93, 0.95, 0.97]), ("bottom_color", [0.98, 0.98, 0.98])):

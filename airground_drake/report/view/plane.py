@@ -155,7 +155,6 @@ def _draw_arena(axes: Axes, rings: Sequence[Array]) -> None:
 
 
 def _name_of(barrier: Barrier) -> Label:
-    """Its name, and when it is there."""
     since = f", from {barrier.appears_s:g} s" if barrier.appears_s else ""
     since += f", until {barrier.disappears_s:g} s" if np.isfinite(barrier.disappears_s) else ""
     return Label(barrier.place_m, f"{short(barrier.name, 12)}{since}", size_pt=7.5)
@@ -238,7 +237,6 @@ def plot(trace: Trace, axes: Axes | None = None) -> Axes:
 
 
 def thumbnail(scenario: Scenario, ways: Mapping[str, Array] | None = None) -> str:
-    """A small picture as an SVG document."""
     # ways: positions (T, 3), m, by UGV; default: the preset trajectories. Those of the first UGVs are drawn.
     if ways is None:
         ways = {name: np.array(ugv.preset.waypoints_m) for name, ugv in scenario.ugvs.items()}
@@ -262,6 +260,5 @@ def thumbnail_of(trace: Trace, prefix: str) -> str:
 
 
 def _disc(axes: Axes, at: Sequence[float] | Array, radius: float, color: str) -> None:
-    """A robot or an obstacle in its true size."""
     if radius:
         axes.add_patch(Circle((at[0], at[1]), radius, facecolor=color, edgecolor=color, alpha=0.35, zorder=1.5))

@@ -10,7 +10,6 @@ from airground_drake.model.geometry import convex, outline
 from airground_drake.model.plants.plant import HEADING
 from airground_drake.model.trigger.automaton import Mode
 from airground_drake.report.view.geometry import outer_edges
-from airground_drake.report.view.looks import OBSTACLE_COLOR, UNSEEN_COLOR
 from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import ARENA, Scenario
@@ -30,6 +29,13 @@ MANY, FINE, COARSE = 100, 16, 4
 # What is this share of a distance away from a core is inside of the polygon about it, also between two corners.
 INWARD = 0.99
 HIGHEST = 2.0  # walls are drawn up to this multiple of the largest height of a robot: others may be endless
+STATE_COLORS = ("#0060a8", "#d98200", "#00705a")
+STATE_MARKS = ("", "▲", "◉")  # by index of STATES; the marks stand beside a robot's name
+# Of proposals; the line is solid if accepted, else dashed.
+OUTCOME_COLORS = {"asked": "#d98200", "accepted": "#00705a", "refused": "#b00020"}
+UAV_COLOR, PATH_COLOR, SAFE_COLOR = "#404040", "#8899aa", "#b03a2e"
+# Of an obstacle on the UAV's map, and of one that is missing on it or exists only there.
+OBSTACLE_COLOR, UNSEEN_COLOR = "#5a5a5a", "#a0a0a0"
 
 
 @dataclass(frozen=True)
@@ -59,12 +65,10 @@ class Barrier:
 
     @property
     def color(self) -> str:
-        """#rrggbb."""
         return OBSTACLE_COLOR if self.known_to_uav else UNSEEN_COLOR
 
     @property
     def is_round(self) -> bool:
-        """Whether it is a ball or a post."""
         return bool(len(self.parts) == 1 and self.parts[0, outline.COUNT] == 1.0)
 
     @property
@@ -75,7 +79,6 @@ class Barrier:
 
     @property
     def top_m(self) -> float:
-        """Its height, m."""
         return float(self.parts[:, outline.TOP].max())
 
     @property
@@ -166,7 +169,6 @@ def stage(scenario: Scenario, visited_m: Array | None = None) -> Stage:
 
 
 def stage_of(trace: Trace, scenario: Scenario) -> Stage:
-    """The stage of a run of a scenario."""
     return stage(scenario, np.concatenate([trace.body(robot) for robot in trace.robots]))
 
 
@@ -223,3 +225,8 @@ def _bounds(scenario: Scenario, visited_m: Array) -> tuple[Array, Array]:
     points += [np.column_stack([ring, np.zeros(4)]) for ring in arena_of(scenario)]
     shown = np.concatenate([*points, visited_m[:1] * [1.0, 1.0, 0.0]])
     return shown.min(axis=0), np.maximum(shown.max(axis=0), shown.min(axis=0) + 1.0)
+
+
+def rgb(color: str) -> list[float]:
+    """Red, green and blue, from 0 to 1, of a colour #rrggbb."""
+    return [int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]

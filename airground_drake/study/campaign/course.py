@@ -82,21 +82,11 @@ class Course:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the UGVs of the largest team."""
         return tuple(f"ugv{i + 1}" for i in range(self.ugvs[1]))
 
     def values(self, rng: np.random.Generator, obstacle_m: float, ugv_m: float, altitude_m: float) -> dict[str, Any]:
-        """Draw UGVs, obstacles, and the UAV's start and target; returns them by dotted key (REPLACES).
-
-        Args:
-            rng: of the draw.
-            obstacle_m: safe distance of a UGV and an obstacle, m.
-            ugv_m: safe distance of two UGVs, m.
-            altitude_m: of the UAV, m; it starts and ends over the centroid of the UGVs.
-
-        Raises:
-            ValueError: if the field is too small.
-        """
+        """Draw UGVs, obstacles, and the UAV's start and target, by dotted key (REPLACES); ValueError without room."""
+        # obstacle_m, ugv_m: safe distances; the UAV starts and ends over the centroid of the UGVs.
         n, m = (int(rng.integers(low, high, endpoint=True)) for low, high in (self.ugvs, self.obstacles))
         eastward = rng.permutation(np.arange(n) % 2 == 0)
         side = np.where(eastward, 0.0, self.length_m)

@@ -49,10 +49,6 @@ def _choice(shares: Array, *values: Any) -> Any:
     return values[min(int(shares[0] * len(values)), len(values) - 1)]
 
 
-def _is_integer(low: Any, high: Any) -> bool:
-    return type(low) is int and type(high) is int and -MAX_SEED <= low <= high <= MAX_SEED
-
-
 KINDS: dict[str, Kind] = {
     "uniform": Kind("[low, high], numbers or lists of numbers", _is_box, _in_box),
     HALTON: Kind("[low, high], numbers or lists of numbers", _is_box, _in_box),
@@ -64,7 +60,7 @@ KINDS: dict[str, Kind] = {
     "normal": Kind("[mean, standard deviation], and [..., low, high] to cut it", _is_normal, _normal),
     "integer": Kind(
         f"[low, high], whole numbers up to {MAX_SEED}",
-        _is_integer,
+        lambda low, high: type(low) is int and type(high) is int and -MAX_SEED <= low <= high <= MAX_SEED,
         lambda shares, low, high: low + min(int(shares[0] * (high - low + 1)), high - low),
     ),
     "choice": Kind("a list of values", lambda *values: bool(values), _choice),
@@ -74,15 +70,10 @@ KINDS: dict[str, Kind] = {
 
 @dataclass(frozen=True)
 class Key:
-    """How a key is drawn.
+    """How a key is drawn."""
 
-    Attributes:
-        kind: a name in `KINDS`. All halton keys of a campaign form one sequence; grids are gone through in turn.
-        given: the parameters.
-    """
-
-    kind: str
-    given: list[Any]
+    kind: str  # all halton keys of a campaign form one sequence; grids are gone through in turn
+    given: list[Any]  # the parameters
 
     @property
     def size(self) -> int:
@@ -138,7 +129,6 @@ def values_at(drawn: Mapping[str, Key], shares: Array) -> dict[str, Any]:
 
 
 def dimensions(drawn: Mapping[str, Key]) -> int:
-    """Number of shares of all keys."""
     return sum(key.size for key in drawn.values())
 
 

@@ -45,7 +45,6 @@ class Counts(NamedTuple):
         return cls(int(tested.sum()) + unfinished, refuted, undecided + unfinished, int((~tested).sum()))
 
     def interval(self, *, anytime: bool) -> tuple[float, float]:
-        """Bounds of the probability of a violation."""
         # Undecided runs count as passes in the lower bound and as violations in the upper bound.
         bounds = confidence_sequence if anytime else clopper_pearson
         low = bounds(self.refuted, self.tested).low
@@ -57,7 +56,6 @@ def _tested(rows: pd.DataFrame) -> pd.Series:
 
 
 def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, dependent: Sequence[str] = ()) -> Json:
-    """All conclusions, for the page of a campaign."""
     # dependent: keys whose values depend on other draws; with any, claims have no intervals.
     first = table.drop_duplicates("index")
     judged = table[table["ended"] == JUDGED]

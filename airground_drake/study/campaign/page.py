@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array
 from airground_drake.report import rules
-from airground_drake.report.quantities import number
-from airground_drake.report.sentences import MARKS, Line
-from airground_drake.report.templating import environment_of
+from airground_drake.report.html import environment_of
+from airground_drake.report.sentences import MARKS, Line, number
 from airground_drake.report.view import canvas, svg
 from airground_drake.study.campaign import swept
 from airground_drake.study.campaign.rows import BATCH, BOTH, CLOCK, DRAKE, JUDGED, SCREENED
@@ -32,7 +31,6 @@ class Drawing(NamedTuple):
 
 
 def page(result: dict[str, Any], table: pd.DataFrame) -> str:
-    """Render the page."""
     template = _environment().get_template("campaign.html.j2")
     return template.render(
         found=result, told=told(result), engines=made_by(result["engines"]), separated=_separated(result),

@@ -28,7 +28,6 @@ class Uniform:
     """Independent points: the baseline."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
-        """For points (n,)."""
         self._rng, self._dimensions = np.random.default_rng(seed), dimensions
 
     def ask(self) -> Array:
@@ -42,7 +41,6 @@ class Halton(Uniform):
     """Points of low discrepancy."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
-        """For points (n,)."""
         self._sequence = qmc.Halton(dimensions, rng=np.random.default_rng(seed))
 
     def ask(self) -> Array:
@@ -53,7 +51,6 @@ class CmaEs:
     """Evolution strategy with covariance matrix adaptation (Hansen 2016), restarted elsewhere when it converges."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
-        """For points (n,)."""
         self._dimensions = dimensions
         self._rng = np.random.default_rng(seed)
         self.restarts = -1

@@ -68,7 +68,6 @@ def _charge(data: Json) -> None:
 
 
 def _at(data: Any, path: tuple[str, ...]) -> Any:
-    """What is at a path of nested mappings; nothing where it leads nowhere."""
     for key in path:
         data = data.get(key, {})
     return data

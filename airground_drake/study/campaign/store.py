@@ -97,7 +97,6 @@ class Store:
         self._lately = {}
 
     def table(self) -> pd.DataFrame:
-        """All rows of all finished draws, by index."""
         return _together(self._in_parts, self._lately)
 
     def close(self) -> None:
@@ -119,7 +118,6 @@ def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
 
 
 def _together(parts: Sequence[pd.DataFrame], lately: dict[int, list[Row]]) -> pd.DataFrame:
-    """Rows of parts and of a journal, by index."""
     both = pd.concat([*parts, table_of(list(chain.from_iterable(lately.values())))], ignore_index=True)
     return both.sort_values("index", kind="stable", ignore_index=True)
 
@@ -147,7 +145,6 @@ def _manifest(folder: Path) -> dict[str, Any] | None:
 
 
 def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
-    """Rows of all parts."""
     if (folder / PARTS).is_symlink():
         raise FolderError(one_line(f"{folder / PARTS} is a link; wanted: a folder"))
     parts, seen = [table_of([])], set[int]()
@@ -223,5 +220,4 @@ def _changed(path: Path, index: object) -> FolderError:
 
 
 def table_of(rows: Sequence[Row]) -> pd.DataFrame:
-    """Rows as a table with the columns and types of `COLUMNS`."""
     return pd.DataFrame(list(rows), columns=list(COLUMNS)).astype(COLUMNS)

@@ -17,7 +17,8 @@ from airground_drake.base.statuses import PASSING
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import Limits, within
 from airground_drake.scenario.schema import Scenario
-from airground_drake.sim.batch.run import Batch, LeftToDrakeError
+from airground_drake.sim.batch.run import Batch, Going, LeftToDrakeError
+from airground_drake.sim.events import arrival_row
 from airground_drake.sim.simulation import Engine, simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.study.campaign.rows import (
@@ -33,11 +34,11 @@ from airground_drake.study.campaign.rows import (
     Row,
     blank,
 )
-from airground_drake.study.campaign.screening import happened, happened_in, screened
 from airground_drake.study.campaign.spec import Spec
 from airground_drake.uav.guest.time_limit import OutOfTime, time_limit
-from airground_drake.verify import Verdict, judge
-from airground_drake.verify.array_judges import SAME
+from airground_drake.verify import Verdict, array_judges, judge
+from airground_drake.verify.array_judges import SAME, ArrayJudges, NoScreenError, triggers
+from airground_drake.verify.registry import run_claims
 
 SHARE = 0.005  # of the runs that the loop made and nothing is wrong with, which Drake makes again
 
@@ -216,4 +217,62 @@ def _of_claim(verdict: Verdict) -> Row:
         "margin": float("nan") if finding.margin is None else float(finding.margin),
         "unit": finding.unit,
         "exercised": float("nan") if finding.exercised is None else float(finding.exercised),
+    }
+
+
+def screened(loop: Batch, made: Going, claims: Collection[str]) -> list[Verdict]:
+    """The verdicts of array judges on a run; none if a claim needs the judge of traces."""
+    if not claims or not {*claims} <= {*array_judges.SCREENED}:
+        return []
+    try:
+        findings = ArrayJudges(loop).findings(made.log, claims)
+    except NoScreenError:
+        return []
+    if len(findings) < len({*claims}):
+        return []
+    expected = loop.given.runs[loop.name].expected
+    return [
+        Verdict.of(claim, loop.name, findings[claim.id], expected.get(claim.id, claim.expected))
+        for claim in run_claims(claims)
+    ]
+
+
+def happened(loop: Batch, made: Going) -> Row:
+    """Triggers, arrivals of UGVs, and decisions of a run, from its arrays; nothing has collided."""
+    log, world, given = made.log, loop.world, loop.given
+    times = [time for of_ugv in triggers(log) for time in of_ugv.tolist()]
+    arrivals = []
+    for i, ugv in enumerate(world.names("ugv")):
+        row = arrival_row(log.bodies[:, 3 * i : 3 * i + 3], given.ugvs[ugv].target_m, given.arrival_tolerance_m)
+        arrivals += [] if row is None else [float(log.t[row])]
+    # Each row has the state of the interval before it.
+    intervened_s = np.diff(log.t) @ (log.executing[1:] >= 0.0)
+    return _times_of(times, arrivals, intervened_s.tolist()) | {
+        "ugvs": len(world.names("ugv")),
+        "decisions": len(made.decided),
+        "accepted": sum(decision.accepted for decision in made.decided),
+        "faults": sum(bool(asking.what) for asking in made.memory.asked),
+    }
+
+
+def happened_in(trace: Trace) -> Row:
+    """The same from a trace."""
+    triggered = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
+    arrivals = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
+    intervened_s = [float(np.diff(trace.t) @ (trace.executing(ugv)[1:] >= 0)) for ugv in trace.ugvs]
+    return _times_of(triggered, arrivals, intervened_s) | {
+        "ugvs": len(trace.ugvs),
+        "decisions": len(trace.decisions),
+        "accepted": int((trace.decisions["decision"] == "accept").sum()),
+        "faults": len(trace.meta["faults"]),
+    }
+
+
+def _times_of(triggers: Sequence[float], arrivals: Sequence[float], intervened_s: Sequence[float]) -> Row:
+    return {
+        "triggers": len(triggers),
+        "first_trigger_s": min(triggers, default=float("nan")),
+        "arrived": len(arrivals),
+        "arrival_s": max(arrivals, default=float("nan")),
+        "intervened_s": max(intervened_s, default=0.0),
     }

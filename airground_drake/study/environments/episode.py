@@ -43,12 +43,10 @@ class ByDrake:
     """A run under way in Drake's Simulator, as `sim.batch.run.Going` is one in the compiled loop."""
 
     def __init__(self, recorder: Recorder, seed: int) -> None:
-        """Begin a run."""
         self._recorder, self._seed = recorder, seed
         self._simulator = recorder.begin(seed)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> NoReturn:
-        """Refuse, and say why."""
         wanted = "make a second environment and reset it with the same number: its episodes are the same"
         raise TypeError(f"this episode cannot be copied: its model is a Drake diagram; {wanted}")
 
@@ -74,7 +72,6 @@ class ByDrake:
         self._recorder.advance(self._simulator, until)
 
     def trace(self) -> Trace:
-        """The trace of the run until now."""
         return self._recorder.trace(self._simulator, self._seed)
 
 
@@ -82,23 +79,15 @@ class Stage:
     """The model of one run, built once, for any number of episodes."""
 
     def __init__(self, scenario: Scenario, run: str) -> None:
-        """Build the model: the compiled loop, or Drake's diagram for what the loop cannot make.
-
-        Args:
-            scenario: from `with_agent`.
-            run: name of its run.
-
-        Raises:
-            PluginError: if it names a policy, route, task or plant that cannot be made.
-        """
+        """Build the compiled loop, or Drake's diagram for what the loop cannot make; the scenario has an agent."""
         self.scenario, self.run = scenario, run
-        self._begin: Callable[[int], Going | ByDrake]
+        self.begin: Callable[[int], Going | ByDrake]  # a run with a seed, at its initial state
         try:
             batch = Batch(scenario, run)
-            self._begin, self.databases = batch.begin, [batch.database]
+            self.begin, self.databases = batch.begin, [batch.database]
         except LeftToDrakeError:
             recorder = Recorder(scenario, run)
-            self._begin = partial(ByDrake, recorder)
+            self.begin = partial(ByDrake, recorder)
             self.databases = [planner.database for planner in recorder.model.planners.values()]
         policies = [policy for database in self.databases for _, policy in database.policies]
         self.agents = [policy for policy in policies if isinstance(policy, Agent)]  # one per UAV
@@ -106,37 +95,19 @@ class Stage:
         self.ugvs = tuple(scenario.ugvs)
         self.instant = Ticks(scenario.intervention.period_s, scenario.control.period_s).instant
 
-    def begin(self, seed: int) -> Going | ByDrake:
-        """A run at its initial state."""
-        return self._begin(seed)
-
 
 class Episode:
     """One run in steps; each leads to the next planning instant at which the policy `agent` is asked.
 
     `copy.deepcopy` copies an episode, for a search over what to propose, unless Drake makes it.
-
-    Attributes:
-        stage: the model.
-        seed: of the decision noise.
-        ended: whether the run is over.
-        away_s: by UGV, for how long it has been away from its target, s, counted at planning instants.
     """
 
     def __init__(self, stage: Stage, seed: int | None = None) -> None:
-        """Begin a run.
-
-        Args:
-            stage: the model; with policies that remember in themselves, a later episode on it ends this one.
-            seed: of the decision noise; default: the scenario's.
-
-        Raises:
-            SimulationError: if Drake or a system stops.
-        """
+        # With policies that remember in themselves, a later episode on a stage ends this one.
         self.stage = stage
         self.seed = stage.scenario.seed if seed is None else seed
         self.ended = False
-        self.away_s = dict.fromkeys(stage.ugvs, 0.0)
+        self.away_s = dict.fromkeys(stage.ugvs, 0.0)  # time away from the target, at planning instants
         self._chosen: dict[str, Proposed] = {}
         self._requests: dict[str, Observation] = {}
         self._run = stage.begin(self.seed)
@@ -163,13 +134,8 @@ class Episode:
         return np.asarray(np.linalg.norm(self.positions() - self.stage.targets, axis=1))
 
     def requests(self) -> dict[str, Observation]:
-        """The requests of the next planning instant that has any, by UGV; empty at the end of the run.
-
-        The instant stays the same until all requests have an answer. An answer may lead to another request.
-
-        Raises:
-            SimulationError: if Drake or a system stops.
-        """
+        """The requests of the next planning instant that has any, by UGV; empty at the end of the run."""
+        # The instant stays the same until all requests have an answer. An answer may lead to another request.
         while not self.ended:
             self._ask()
             if self._requests:
@@ -178,11 +144,7 @@ class Episode:
         return {}
 
     def answer(self, robot: str, proposed: Proposed) -> None:
-        """Answer the request for a UGV; what is proposed is checked and sent as of any policy.
-
-        Raises:
-            ValueError: if there is no such request.
-        """
+        """Answer the request for a UGV; what is proposed is checked and sent as of any policy."""
         if robot not in self._requests:
             asked = ", ".join(self._requests or ["none"])
             raise ValueError(f"no proposal for {robot} is asked for now; asked for: {asked}")
@@ -190,7 +152,6 @@ class Episode:
         self._chosen[robot] = proposed
 
     def trace(self) -> Trace:
-        """The trace of the run until now; its scenario has this time as its duration."""
         return self._run.trace()
 
     def _ask(self) -> None:

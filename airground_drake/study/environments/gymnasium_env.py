@@ -4,22 +4,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.study.environments.extra import needed
+from airground_drake.study.environments.sources import needed
 
 with needed():
     import gymnasium
 
-from airground_drake.base.arrays import Array
 from airground_drake.scenario.schema import Scenario
 from airground_drake.study.campaign.spec import Spec
 from airground_drake.study.environments.encoding import Encoding, Numbers
-from airground_drake.study.environments.rewards import Rewards
-from airground_drake.study.environments.sources import Episodes
+from airground_drake.study.environments.sources import Episodes, Rewards
 from airground_drake.uav.policy import Observation
-
-Flags = npt.NDArray[np.bool_]
 
 # For `gymnasium.make` and `make_vec`, once this module is imported; arguments as of `InterventionEnv`.
 ID = "AirgroundDrake/Intervention-v0"
@@ -101,14 +96,12 @@ class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
         return info if self._seen is None else info | {"ugv": self._seen.robot}
 
 
-class InterventionVectorEnv(gymnasium.vector.VectorEnv[Numbers, Numbers, Any]):
+class InterventionVectorEnv(gymnasium.vector.SyncVectorEnv):
     """Several `InterventionEnv` side by side in one process, whose arrays are stacked.
 
     An episode that is over is followed by another one at the next step, which ignores that action (`NEXT_STEP`). Models
     are shared unless the scenario has policies beside the agent's, which may remember something of their own.
     """
-
-    metadata = {"render_modes": [], "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(
         self,
@@ -122,47 +115,11 @@ class InterventionVectorEnv(gymnasium.vector.VectorEnv[Numbers, Numbers, Any]):
         if num_envs < 1:
             raise ValueError(f"num_envs is {num_envs!r}; allowed: a whole number from 1")
         first = InterventionEnv(given, run, numbers, encoding)
-        others = (
-            first.beside() if first.is_alone else InterventionEnv(given, run, numbers, encoding)
-            for _ in range(num_envs - 1)
-        )
-        self.envs = (first, *others)
-        self.num_envs = num_envs
-        self.single_observation_space, self.single_action_space = first.observation_space, first.action_space
-        self.observation_space = gymnasium.vector.utils.batch_space(first.observation_space, num_envs)
-        self.action_space = gymnasium.vector.utils.batch_space(first.action_space, num_envs)
-        self._over = np.zeros(num_envs, dtype=np.bool_)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Numbers, dict[str, Any]]:
-        """Begin an episode in each environment, with consecutive seeds; otherwise as `InterventionEnv.reset`."""
-        super().reset(seed=seed)
-        seeds = [None if seed is None else seed + k for k in range(self.num_envs)]
-        begun = [env.reset(seed=own, options=options) for env, own in zip(self.envs, seeds, strict=True)]
-        self._over[:] = False
-        return np.stack([observation for observation, _ in begun]), self._together([info for _, info in begun])
+        def another() -> InterventionEnv:
+            return first.beside() if first.is_alone else InterventionEnv(given, run, numbers, encoding)
 
-    def step(self, actions: Numbers) -> tuple[Numbers, Array, Flags, Flags, dict[str, Any]]:
-        """A step of each environment, or the beginning of its next episode; raises as `InterventionEnv.step`."""
-        if len(actions) != self.num_envs:
-            raise ValueError(f"{len(actions)} actions; wanted: {self.num_envs}")
-        observations, rewards, infos = [], np.zeros(self.num_envs), list[dict[str, Any]]()
-        for k, (env, action) in enumerate(zip(self.envs, actions, strict=True)):
-            if self._over[k]:
-                (observation, info), self._over[k] = env.reset(), False
-            else:
-                observation, rewards[k], self._over[k], _, info = env.step(action)
-            observations.append(observation)
-            infos.append(info)
-        return np.stack(observations), rewards, self._over.copy(), np.zeros_like(self._over), self._together(infos)
-
-    def _together(self, infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
-        """The infos of all environments in Gymnasium's form."""
-        together: dict[str, Any] = {}
-        for k, info in enumerate(infos):
-            together = self._add_info(together, info, k)
-        return together
+        super().__init__([lambda: first, *[another] * (num_envs - 1)])
 
 
 gymnasium.register(

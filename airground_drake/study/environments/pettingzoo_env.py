@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.study.environments.extra import needed
+from airground_drake.study.environments.sources import needed
 
 with needed():
     from gymnasium.spaces import Box
@@ -15,8 +15,7 @@ with needed():
 from airground_drake.scenario.schema import Scenario
 from airground_drake.study.campaign.spec import Spec
 from airground_drake.study.environments.encoding import Encoding, Numbers
-from airground_drake.study.environments.rewards import Rewards
-from airground_drake.study.environments.sources import Episodes
+from airground_drake.study.environments.sources import Episodes, Rewards
 from airground_drake.uav.policy import Observation
 
 

@@ -1,9 +1,10 @@
 """Where the episodes of an environment come from: one scenario, or the draws of a campaign; the present episode."""
 
 import copy
-from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import lru_cache
 from numbers import Integral
 from typing import Any, Self
 
@@ -18,6 +19,30 @@ from airground_drake.sim.trace import Trace
 from airground_drake.study.campaign.spec import Spec
 from airground_drake.study.environments.encoding import Encoding
 from airground_drake.study.environments.episode import AGENT, Episode, Stage, with_agent
+
+
+class Rewards:
+    """Rewards of the UGVs of an episode.
+
+    The reward of a UGV for a step is minus the time, s, for which it was away from its target since the request before.
+    At the end of the run a UGV that is still away also loses the time, s, that the straight way left would take at the
+    speed of its preset. Rewards ignore safety: `judge` says what is proved.
+    """
+
+    def __init__(self, episode: Episode) -> None:
+        self._episode, self._before = episode, dict(episode.away_s)
+
+    def since(self) -> dict[str, float]:
+        """Rewards by UGV since the last call."""
+        now, self._before = self._before, dict(self._episode.away_s)
+        reward = {ugv: now[ugv] - away for ugv, away in self._before.items()}
+        if self._episode.ended:
+            scenario = self._episode.stage.scenario
+            for ugv, left in zip(reward, self._episode.distances_left().tolist(), strict=False):
+                if left > scenario.arrival_tolerance_m:
+                    reward[ugv] -= left / scenario.ugvs[ugv].preset.speed_m_s
+        return reward
+
 
 DEFAULT = "minimal"
 MOST_STAGES = 64  # models that are kept; one takes about 0.5 MB
@@ -55,7 +80,7 @@ class Source:
         self.ugvs = tuple(first.ugvs)
         if isinstance(given, Spec) and given.course is not None:
             self.ugvs = given.course.names
-        self._stages = OrderedDict[int, Stage]()
+        self._stage = lru_cache(MOST_STAGES)(self._made)
 
     def drawn(self, rng: np.random.Generator) -> int:
         """The number of an episode, drawn."""
@@ -69,18 +94,12 @@ class Source:
             SimulationError: if Drake or a system stops.
         """
         if not isinstance(self._given, Spec):
-            return Episode(self._stage(0, self._given), number)
-        stage = self._stages.get(number) or self._stage(number, self._given.draw(number))
-        return Episode(stage)
+            return Episode(self._stage(0), number)
+        return Episode(self._stage(number))
 
-    def _stage(self, key: int, scenario: Scenario) -> Stage:
-        """The model of a scenario, built if it is not there."""
-        if key not in self._stages:
-            self._stages[key] = Stage(with_agent(scenario, self._run), self._run)
-        self._stages.move_to_end(key)
-        if len(self._stages) > MOST_STAGES:
-            self._stages.popitem(last=False)
-        return self._stages[key]
+    def _made(self, number: int) -> Stage:
+        scenario = self._given.draw(number) if isinstance(self._given, Spec) else self._given
+        return Stage(with_agent(scenario, self._run), self._run)
 
 
 class Episodes:
@@ -170,3 +189,13 @@ def _chosen(scenario: Scenario, run: str | None) -> str:
     if run not in having:
         raise UnknownNameError("run with interventions", run, having)
     return run
+
+
+@contextmanager
+def needed() -> Iterator[None]:
+    """In the body, a package that is missing is named with the extra that brings it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        hint = f"environments need the package {error.name}: pip install 'airground_drake[gym]'"
+        raise ModuleNotFoundError(hint, name=error.name) from None

@@ -29,14 +29,9 @@ _IS_NED = re.compile(r"(?<![a-z])ned(?![a-z])|vehicle_local_position", re.IGNORE
 
 def parsed(text: str) -> list[tuple[int, float]]:
     """The column and sign of each axis: `x,-z,y`; ValueError for anything else."""
-    axes = [("xyz".index(part[-1:]), -1.0 if part[0] == "-" else 1.0) for part in text.split(",") if _is_axis(part)]
-    if len(axes) != len(text.split(",")) or sorted(axis for axis, _ in axes) != [0, 1, 2]:
+    if not re.fullmatch(r"[+-]?[xyz](,[+-]?[xyz]){2}", text) or not {*"xyz"} <= {*text}:
         raise ValueError(text)
-    return axes
-
-
-def _is_axis(part: str) -> bool:
-    return re.fullmatch(r"[+-]?[xyz]", part) is not None
+    return [("xyz".index(part[-1]), -1.0 if part[0] == "-" else 1.0) for part in text.split(",")]
 
 
 def chosen(streams: Mapping[str, Stream], choice: Mapping[str, str]) -> None:
@@ -63,7 +58,10 @@ def recognised(streams: Mapping[str, Stream], scenario: Json, without: Collectio
     if not robots or _fits(robots, scenario, PLAIN):
         _ask(robots, scenario, _below(robots, scenario), [NED, "x,-y,-z"])
         return []
-    named = {name: stream for name, stream in robots.items() if _is_named_ned(stream)}
+    named = {
+        name: stream for name, stream in robots.items()
+        if any(map(_IS_NED.search, (stream.name, stream.frame, stream.child, Path(stream.source).name)))
+    }  # fmt: skip
     if named and _fits(named, scenario, NED):
         for turned in named.values():
             _turn(turned, NED)
@@ -88,10 +86,6 @@ def _ask(robots: Mapping[str, Stream], scenario: Json, why: str, likely: Iterabl
         option = f"--axes={first}" if first[0] == "-" else f"--axes {first}"
         wanted = f"wanted: {option}{begins} if {OTHERS[first]}, or --axes {PLAIN} if they are as in the scenario"
         raise LogError(one_line(f"the axes of the log are not clear: {why}; {wanted}"))
-
-
-def _is_named_ned(stream: Stream) -> bool:
-    return any(map(_IS_NED.search, (stream.name, stream.frame, stream.child, Path(stream.source).name)))
 
 
 def _fits(robots: Mapping[str, Stream], scenario: Json, axes: str) -> bool:

@@ -45,7 +45,6 @@ class Unpacker:
     """Unpacks parts of a file of a stranger, up to a limit for each part and for all of them."""
 
     def __init__(self, size: int) -> None:
-        """Begin with a file of so many bytes."""
         self.left = max(files.MOST_UNPACKED, DENSEST * size)
 
     def unpacked(self, data: bytes, how: str) -> bytes:

@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from airground_drake.base.errors import LogError
-from airground_drake.study.logs.names import is_elsewhere, segments
-from airground_drake.study.logs.stream import PER_M, PER_S
+from airground_drake.report.sentences import some
+from airground_drake.study.logs.stream import PER_M, PER_S, is_elsewhere, segments
 
 # Other words for units.
 WORDS = {
@@ -57,7 +57,6 @@ class Time(NamedTuple):
     owner: str
 
     def is_of(self, place: Place) -> bool:
-        """Whether it may be the clock of a place."""
         after = place.name[len(self.owner) :]
         return not self.owner or (place.name.startswith(self.owner) and not after[:1].isalnum())
 
@@ -99,7 +98,6 @@ class Columns(NamedTuple):
 
 
 def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection[str]) -> Columns:
-    """The meaning of each column."""
     # chosen: names of columns by what they are, see `TARGETS`, with `{body}` for the name of a body; a unit may follow
     # what they are: `x_mm`.
     labels, mapped = _mapped(labels, chosen)
@@ -178,9 +176,7 @@ def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str]
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:
-    """Some names in a line."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    return some(names, most)
 
 
 def _last(label: str) -> str:
@@ -188,7 +184,6 @@ def _last(label: str) -> str:
 
 
 def _named(labels: Sequence[str], names: Sequence[str]) -> int | None:
-    """The first column with the first of some names."""
     last = [_last(label) for label in labels]
     return next((last.index(name) for name in names if name in last), None)
 

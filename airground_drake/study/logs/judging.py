@@ -7,7 +7,7 @@ it lacks e_k, the deficit below d obeys deficit <= (1 - A h) deficit + e_k, by t
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -134,15 +134,11 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
     # errors_m: by how much a body's recorded position may be wrong, by its name.
     bodies = tracks.bodies
     errors = {name: error_m for name, error_m in (errors_m or {}).items() if name in bodies}
-    resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
     whole = _whole(bodies)
     if whole.begin == whole.end:
         raise LogError(f"the log has positions at {whole.begin:.6g} s only; wanted: at two times at least")
-    pairs = []
-    for pair in _pairs(scenario, bodies):
-        own, other = _both(pair, bodies, scenario, resting, barriers, whole)
-        if (judged := _judged(pair, own, other, scenario, errors, whole)) is not None:
-            pairs.append(judged)
+    every = (_judged(*tracked, scenario, errors, whole) for tracked in _tracked(bodies, scenario, whole))
+    pairs = [judged for judged in every if judged is not None]
     robots = {name: robot for name, robot in robots_of(scenario).items() if name in bodies}
     speeds = {name: (_speed(bodies[name]), float(robot["max_speed_m_s"])) for name, robot in robots.items()}
     away = {
@@ -173,11 +169,8 @@ def _whole(bodies: Mapping[str, Track]) -> Span:
 
 def courses(tracks: Tracks, scenario: Json) -> dict[tuple[str, str], list[tuple[Array, Array]]]:
     """Distances over time of each pair, between surfaces: times (m,), s, and distances (m,), m, of each stretch."""
-    bodies, courses_m = tracks.bodies, {}
-    resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
-    whole = _whole(bodies)
-    for pair in _pairs(scenario, bodies):
-        own, other = _both(pair, bodies, scenario, resting, barriers, whole)
+    courses_m = {}
+    for pair, own, other in _tracked(tracks.bodies, scenario, _whole(tracks.bodies)):
         times = [_knots(own, other, span) for span in _common(own, other)] if len(other.t_s) else []
         courses_m[pair.robot, pair.other] = [
             (t_s, _signed(pair.shape, own.at(t_s) - other.at(t_s)) - pair.radii_m) for t_s in times
@@ -185,24 +178,22 @@ def courses(tracks: Tracks, scenario: Json) -> dict[tuple[str, str], list[tuple[
     return courses_m
 
 
-def _both(
-    pair: Pair, bodies: Mapping[str, Track], scenario: Json, resting: Mapping[str, Array], barriers: Mapping[str, Json],
-    whole: Span,
-) -> tuple[Track, Track]:  # fmt: skip
-    """The tracks of a pair."""
-    own = _seen(bodies[pair.robot], pair.robot, pair, scenario)
-    if pair.other in bodies:
-        other = _seen(bodies[pair.other], pair.other, pair, scenario)
-        if pair.other in barriers:
-            begin, end = _there(barriers[pair.other], whole)
-            during = (other.t_s >= begin - SMALL) & (other.t_s <= end + SMALL)
+def _tracked(bodies: Mapping[str, Track], scenario: Json, whole: Span) -> Iterator[tuple[Pair, Track, Track]]:
+    """Each pair with its tracks; that of an obstacle is cut to the time for which it is there."""
+    resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
+    for pair in _pairs(scenario, bodies):
+        there = _there(barriers[pair.other], whole) if pair.other in barriers else whole
+        if pair.other in bodies:
+            other = _seen(bodies[pair.other], pair.other, pair, scenario)
+            during = (other.t_s >= there.begin - SMALL) & (other.t_s <= there.end + SMALL)
             other = replace(other, t_s=other.t_s[during], places_m=other.places_m[during])
-        return own, other
-    return own, _standing(resting[pair.other], barriers[pair.other], whole)
+        else:
+            t_s = np.array([*there] if there.end >= there.begin else [])
+            other = Track(t_s, np.repeat(resting[pair.other], len(t_s), axis=0), np.inf)
+        yield pair, _seen(bodies[pair.robot], pair.robot, pair, scenario), other
 
 
 def _pairs(scenario: Json, bodies: Mapping[str, Track]) -> list[Pair]:
-    """The pairs of bodies that are in the log; further UAVs are as the scenario's first one."""
     pairs, uavs = pairs_of(scenario), uavs_of(scenario)
     first = next(iter(uavs.values()))
     for name in bodies:
@@ -228,20 +219,12 @@ def _seen(track: Track, name: str, pair: Pair, scenario: Json) -> Track:
     return replace(track, places_m=places)
 
 
-def _standing(place: Array, body: Json, whole: Span) -> Track:
-    """The track of what stands, while it is there."""
-    there = _there(body, whole)
-    t_s = np.array([*there] if there.end >= there.begin else [])
-    return Track(t_s, np.repeat(place, len(t_s), axis=0), np.inf)
-
-
 def _there(body: Json, whole: Span) -> Span:
     """When an obstacle is there, in a log that begins with the scenario."""
     return Span(max(whole.begin, float(body["appears_s"])), min(whole.end, float(body["disappears_s"]) or np.inf))
 
 
 def _common(own: Track, other: Track) -> list[Span]:
-    """Stretches in which both were recorded."""
     both = (Span(max(a.begin, b.begin), min(a.end, b.end)) for a in own.spans for b in other.spans)
     return [span for span in both if span.end >= span.begin]
 
@@ -343,7 +326,6 @@ class _Law:
 
 
 def _signed(shape: Shape, apart: Array) -> Array:
-    """Signed distances, (K,), m."""
     return np.min([part.signed_m(apart) for part in shape.parts], axis=0)
 
 
@@ -426,7 +408,6 @@ def _too_fast(other: Track, scenario: Json, pair: Pair, error_m: float) -> float
 
 
 def _speed(track: Track) -> float:
-    """Largest speed without a gap, m/s."""
     moved, lasts = _moved(track)
     return float((moved / lasts).max(initial=0.0))
 
@@ -450,7 +431,6 @@ def _longest(track: Track) -> float:
 
 
 def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
-    """All of it as strict JSON."""
     pairs = [
         {
             **pair._asdict(), "status": pair.status, "margin_m": pair.margin_m, "hypotheses": pair.hypotheses,

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from airground_drake.study.logs.names import is_elsewhere, segments
-from airground_drake.study.logs.stream import HEADERS, PER_S, RECEIPT, Stream, unit_since_1970
+from airground_drake.study.logs.stream import HEADERS, PER_S, RECEIPT, Stream, is_elsewhere, segments, unit_since_1970
 
 # Beginnings of types that say nothing about where a robot is, or cannot be told from those that do.
 NO_PLACES = ("sensor_msgs/", "visualization_msgs/", "rcl_interfaces/", "rosgraph_msgs/", "foxglove.SceneUpdate")
@@ -34,7 +33,6 @@ class Place(NamedTuple):
 
 
 def places(message: Any) -> Iterator[Place]:
-    """The positions in a message."""
     names, poses = _of(message, "name"), _of(message, "pose")
     if isinstance(names, list) and isinstance(poses, (list, np.ndarray)):  # Gazebo's model states
         for name, pose in zip(names, poses, strict=False):

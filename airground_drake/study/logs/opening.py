@@ -17,7 +17,6 @@ MOST_FILES = 1_000  # of a log
 
 
 def opened(paths: Sequence[Path], wanted: Wanted) -> Log:
-    """The streams of the files and folders of a log."""
     # A folder may have other files, too: these are named as not used.
     log = Log()
     for outer in paths:

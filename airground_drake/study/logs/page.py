@@ -38,7 +38,6 @@ _MAP_IN, _PANEL_IN, _HEIGHT_IN = 6.0, 7.5, 2.1
 def write(
     folder: Path, judged: Judged, tracks: Tracks, scenario: Scenario, errors_m: Mapping[str, float], logs: Sequence[str]
 ) -> list[Path]:
-    """Write the page and the replay to a folder."""
     pages = {}
     if judged.end_s - judged.begin_s <= LONGEST_REPLAY_S:
         pages[REPLAY] = replay_page(scene(judged, tracks, scenario, logs))
@@ -82,7 +81,8 @@ def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
         labels += [Label(track.places_m[-1], short(name, 12), appearance.color, weight="bold")]
         ways += parts
     for pair in [pair for pair in judged.pairs if pair.status == BROKEN][: words.MOST_NAMED]:
-        both = [tracks.bodies[name].at(np.array([pair.at_s]))[0, :2] for name in _recorded(pair, tracks)]
+        recorded = [name for name in (pair.first, pair.second) if name in tracks.bodies]
+        both = [tracks.bodies[name].at(np.array([pair.at_s]))[0, :2] for name in recorded]
         axes.plot(*np.transpose(both), "-X", color=ALARM, markersize=9, markeredgecolor="white", zorder=6)
         labels.append(Label(both[0], f"{pair.least_m:.3f} m at {pair.at_s:.2f} s", ALARM))
     place(axes, [*labels, *of_barriers], [*ways, *edges])
@@ -94,10 +94,6 @@ def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
     columns = ("body", "first, s", "x, m", "y, m", "last, s", "x, m", "y, m")
     drawn = panel(figure, "map", "Map of the log", says, "", Table("First and last positions", columns, rows))
     return Figure("map", "Where they were", says + " Crosses in red: where a broken distance was least.", (drawn,))
-
-
-def _recorded(pair: JudgedPair, tracks: Tracks) -> list[str]:
-    return [name for name in (pair.first, pair.second) if name in tracks.bodies]
 
 
 def _parts(track: Track) -> list[Array]:

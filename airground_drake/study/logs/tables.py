@@ -14,8 +14,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import LogError
 from airground_drake.study.logs import text
 from airground_drake.study.logs.columns import WORDS, Columns, Place, Time, clock_of, columns, counts_frames, listed
-from airground_drake.study.logs.names import body_of, renamed
-from airground_drake.study.logs.stream import PER_M, Log, Stream, Whole
+from airground_drake.study.logs.stream import PER_M, Log, Stream, Whole, body_of, renamed
 
 TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]  # columns of a file in TUM's format, which has no header
 # First columns of what `ros2 topic echo --csv` prints of a pose; of odometry, the other frame stands before x.
@@ -52,8 +51,10 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
         named = [*ECHO[:3], *child, *ECHO[3:]]
         table = table._replace(labels=(labels := [*named, *labels[len(named) :]]))
     has = columns(labels, wanted.columns, wanted.bodies)
-    if not has.times and (counter := _counter(table)) is not None:
-        has = has._replace(times=[Time(counter, None, "", 1, "")])
+    for k in (k for k, label in enumerate(labels) if not has.times and counts_frames(label)):
+        if all(map(text.is_number, table.cells[k].unique()[:100])):
+            has = has._replace(times=[Time(k, None, "", 1, "")])
+            break
     if not has.times or not has.places:
         wants = {"a column of times": has.times, "columns x and y": has.places}
         lacks = " and ".join(name for name, there in wants.items() if not there)
@@ -88,12 +89,6 @@ def _has_turns(table: text.Table) -> bool:
     """Whether the last four columns of most rows are a quaternion of length 1, as those of TUM are."""
     numbers = table.cells.iloc[:, -4:].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
     return bool((np.abs(np.linalg.norm(numbers, axis=1) - 1.0) <= UNIT_LENGTH).mean() > 0.5)
-
-
-def _counter(table: text.Table) -> int | None:
-    """The column with the numbers of frames, if there is one."""
-    those = (k for k, label in enumerate(table.labels) if counts_frames(label))
-    return next((k for k in those if all(map(text.is_number, table.cells[k].unique()[:100]))), None)
 
 
 def _frames(table: text.Table, has: Columns) -> pd.Series | None:

@@ -39,7 +39,6 @@ class Table(NamedTuple):
 
 
 def read(content: bytes) -> Table:
-    """The table in a text file."""
     lines = re.sub(r"\r+\n", "\n", _decoded(content)).replace("\r", "\n").split("\n")
     full = [k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
     if not full:

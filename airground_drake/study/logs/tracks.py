@@ -13,8 +13,19 @@ from airground_drake.base.errors import LogError, one_line
 from airground_drake.check.files import Json
 from airground_drake.check.limits import LARGEST
 from airground_drake.check.scenario import expected_m_s, robots_of, uavs_of
-from airground_drake.study.logs import axes, names, units
-from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, RECEIPT, Log, Stream, Whole
+from airground_drake.study.logs import axes, units
+from airground_drake.study.logs.stream import (
+    OF_MESSAGES,
+    PER_M,
+    RECEIPT,
+    Log,
+    Stream,
+    Whole,
+    body_of,
+    is_elsewhere,
+    renamed,
+    segments,
+)
 
 # A body was not recorded where two of its samples are farther apart than this multiple of the usual time between.
 GAP = 2.5
@@ -111,7 +122,6 @@ def known(scenario: Json, choice: Choice, others: Sequence[str] = ()) -> None:
 
 
 def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
-    """The tracks of the bodies of a scenario."""
     bodies = [name for name in bodies_of(scenario, choice.uavs) if name not in choice.without]
     streams, ignored = _assigned(log, bodies, choice)
     _in_one_frame({name: stream.frame for name, stream in streams.items()}, choice.frames)
@@ -129,7 +139,8 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
         if name not in streams and name not in choice.without:
             for stream in log.streams:
                 if stream.skipped and not len(stream.whole) and _body_of(stream, bodies, choice.rename)[0] == name:
-                    raise LogError(one_line(f"{name} has no usable rows: {_skipped(stream)}; wanted: {_USABLE}"))
+                    unusable = ", ".join(f"{n} with {why}{_where(stream, why)}" for why, n in stream.skipped.items())
+                    raise LogError(one_line(f"{name} has no usable rows: {unusable}; wanted: {_USABLE}"))
             raise LogError(_not_there(name, log, choice))
     if len(clocks := {stream.clock for stream in streams.values() if stream.clock in OF_MESSAGES}) > 1:
         late = ", ".join(name for name, stream in streams.items() if stream.clock == RECEIPT)
@@ -220,15 +231,15 @@ def _exist(rename: Mapping[str, str], log: Log, bodies: Collection[str]) -> None
 
 def _body_of(stream: Stream, bodies: Collection[str], rename: Mapping[str, str]) -> tuple[str, int]:
     """The body of a stream, or '', and how near its name is: 0 renamed, 1 `OF_BODY`, 2 equal, 3 part of it."""
-    if body := names.renamed((stream.name, stream.child, stream.label), rename):
+    if body := renamed((stream.name, stream.child, stream.label), rename):
         return body, 0
     for name in filter(None, (stream.name, stream.child)):
         for rank, plain in ((1, name.removesuffix(OF_BODY)), (2, name.strip("/"))):
             if plain in bodies and (rank == 2 or plain != name):
                 return plain, rank
-        if names.is_elsewhere(name, bodies):
+        if is_elsewhere(name, bodies):
             break
-        if body := names.body_of(name, bodies, is_file=stream.is_file):
+        if body := body_of(name, bodies, is_file=stream.is_file):
             return body, 3
     return "", 3
 
@@ -240,7 +251,6 @@ def _links(streams: list[Stream]) -> list[Stream]:
 
 
 def _merged(streams: list[Stream]) -> Stream:
-    """One stream of several files."""
     first = streams[0]
     for other in streams[1:]:
         if (other.time_unit, other.length_unit, other.clock) != (first.time_unit, first.length_unit, first.clock):
@@ -263,15 +273,10 @@ def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
     if len({*stated.values()}) > 1:
         wanted = "wanted: positions in one frame, such as map or world; or --frame for each name of that one frame"
         raise LogError(one_line(f"positions are in different frames: {several}; {wanted}"))
-    if len(frames) > 1 and stated and names.segments(next(iter(stated.values())))[-1] == "odom":
+    if len(frames) > 1 and stated and segments(next(iter(stated.values())))[-1] == "odom":
         wanted = "wanted: positions in one frame, such as map or world; or --frame odom if this is one for all"
         raise LogError(one_line(f"odometry is in a frame of each robot's own, though both may be called odom: "
                                 f"{several}; {wanted}"))  # fmt: skip
-
-
-def _skipped(stream: Stream) -> str:
-    """Rows of a stream that cannot be used, in words."""
-    return ", ".join(f"{count} with {reason}{_where(stream, reason)}" for reason, count in stream.skipped.items())
 
 
 def _where(stream: Stream, reason: str) -> str:

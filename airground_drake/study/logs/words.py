@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from airground_drake.check.rules import SMALL
+from airground_drake.report.sentences import some
 from airground_drake.study.logs.judging import BROKEN, KEPT, NOT_JUDGED, OPEN, Judged, JudgedPair
 from airground_drake.study.logs.tracks import Span, Tracks
 
@@ -16,7 +17,6 @@ MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
 
 
 def headline(judged: Judged) -> str:
-    """The verdict in a line."""
     broken = [pair for pair in judged.pairs if pair.status == BROKEN]
     unsure = [pair for pair in judged.pairs if pair.status == OPEN]
     if broken:
@@ -32,7 +32,6 @@ def headline(judged: Judged) -> str:
 
 
 def coverage(judged: Judged) -> str:
-    """How much of the time is covered, in a sentence."""
     lasts = judged.end_s - judged.begin_s
     text = f"The log has {min(lasts, judged.duration_s):.6g} of the scenario's {judged.duration_s:g} s"
     if lasts > LONGER * judged.duration_s:
@@ -46,7 +45,6 @@ def coverage(judged: Judged) -> str:
 
 
 def least(pair: JudgedPair) -> str:
-    """The least distance of a pair, and when."""
     below = f", below it {spans(pair.below_s)}" if pair.below_s else ""
     error = f" ± {pair.error_m:g} m" if pair.error_m else ""
     what = "overlap by " if pair.least_m < 0.0 else ""
@@ -54,14 +52,11 @@ def least(pair: JudgedPair) -> str:
 
 
 def spans(those: Sequence[Span]) -> str:
-    """Stretches of time."""
-    told = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those[:MOST_SPANS]]
-    more = f" and {len(those) - MOST_SPANS} more" if len(those) > MOST_SPANS else ""
-    return ", ".join(told) + more
+    told = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those]
+    return some(told, MOST_SPANS)
 
 
 def doing(pair: JudgedPair) -> str:
-    """Who approached whom before the least distance."""
     told = []
     for name, came in sorted(pair.came_m.items(), key=lambda item: -item[1]):
         if came >= LEAST_TOLD_M:
@@ -74,7 +69,6 @@ def doing(pair: JudgedPair) -> str:
 
 
 def law(pair: JudgedPair) -> str:
-    """What the theorem says of a pair."""
     if pair.missed_m <= SMALL:
         held = f"the law held in all {pair.intervals} intervals"
     else:
@@ -96,7 +90,6 @@ def law(pair: JudgedPair) -> str:
 
 
 def remarks(judged: Judged) -> Iterator[str]:
-    """What does not fit the scenario, although it does not decide about a distance."""
     for name, (speed, limit) in judged.speeds_m_s.items():
         if speed > FASTER * limit:
             yield f"{name} moves at up to {speed:.3g} m/s, above its limit of {limit:g} m/s"
@@ -110,7 +103,6 @@ def remarks(judged: Judged) -> Iterator[str]:
 
 
 def source(name: str, tracks: Tracks) -> str:
-    """Where the positions of a body are from."""
     track = tracks.bodies[name]
     frame = f" in frame {track.told['frame']}" if track.told.get("frame") else ""
     clock = f", by {track.told['clock']}" if track.told.get("clock") else ""
@@ -120,7 +112,6 @@ def source(name: str, tracks: Tracks) -> str:
 
 
 def not_judged(judged: Judged) -> Iterator[str]:
-    """What the verdict does not say."""
     first, *others = NOT_JUDGED
     longest = f"the longest interval is {judged.longest_s:.3g} s, in which a robot"
     yield f"{first}; {longest} at its speed limit can leave the line by {judged.stray_m:.2g} m"
@@ -128,7 +119,6 @@ def not_judged(judged: Judged) -> Iterator[str]:
 
 
 def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
-    """All that is printed."""
     yield headline(judged)
     for pair in [pair for pair in judged.pairs if pair.status == BROKEN][:MOST_NAMED]:
         yield f"  {pair.first}, {pair.second}: {doing(pair)}"

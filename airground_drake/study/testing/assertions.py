@@ -4,14 +4,24 @@ import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from airground_drake.base.files import strict
 from airground_drake.base.statuses import PASSING
-from airground_drake.scenario.load import Overrides
+from airground_drake.report.attention import in_words, place_of
+from airground_drake.report.model import Claim
+from airground_drake.report.sentences import told as value_of
+from airground_drake.scenario.load import Overrides, load, validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
-from airground_drake.study.testing.scenario import chosen
-from airground_drake.study.testing.words import told
 from airground_drake.verify.claim import TraceClaim, Verdict
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.judging import judge, judge_model
+
+_FOUND = {
+    "refuted": "is refuted",
+    "inconclusive": "is inconclusive: neither established nor refuted",
+    "error": "could not be decided",
+    "not_run": "was not decided",
+}
 
 
 class ClaimError(AssertionError):
@@ -83,6 +93,10 @@ def assert_proved(
     _require(judge_model(wanted, kept=kept, claims=claims or None), f"for {wanted.name}", exercised=False)
 
 
+def chosen(scenario: str | Path | Scenario, overrides: Overrides) -> Scenario:
+    return validated(scenario, overrides) if isinstance(scenario, Scenario) else load(scenario, overrides)
+
+
 def _require(verdicts: Iterable[Verdict], place: str, *, exercised: bool) -> None:
     """Raise for failing verdicts; warn about claims that nothing tested."""
     __tracebackhide__ = True
@@ -95,3 +109,25 @@ def _require(verdicts: Iterable[Verdict], place: str, *, exercised: bool) -> Non
             warnings.warn(NotExercisedWarning(told(verdict, place).partition("\n")[0]), stacklevel=3)
     if failed:
         raise ClaimError("\n".join(told(verdict, place) for verdict in failed), failed)
+
+
+def told(verdict: Verdict, place: str) -> str:
+    """A verdict in several lines: what was claimed, what was found, by whom and when, and what was seen there."""
+    of = verdict.claim
+    claim = Claim.model_construct(exercised_by=of.exercised_by, **strict(Finding.to_json(verdict)))
+    lines = [f"{of.id} {_found(verdict)}, {place}", f"  claim: {of.statement}", f"  found: {in_words(claim)}"]
+    if claim.margin is not None and claim.status not in PASSING:
+        margin = value_of(claim.margin, claim.unit)
+        lines.append(f"  value: {claim.quantity or 'margin'}: {margin}; at least 0 is needed")
+    if seen := place_of(claim):
+        lines.append(f"  seen: {value_of(seen, digits=6)}")
+    return "\n".join(lines)
+
+
+def _found(verdict: Verdict) -> str:
+    if verdict.status not in PASSING:
+        return _FOUND[verdict.status]
+    if verdict.exercised is None:
+        return f"{verdict.status}, but does not count what tests it"
+    what = verdict.claim.exercised_by or "things"
+    return f"{verdict.status}, but nothing tested it ({verdict.exercised} {what})"

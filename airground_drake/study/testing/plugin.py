@@ -6,9 +6,9 @@ Every session of pytest loads it where the package is installed. It imports Drak
 from __future__ import annotations
 
 import fcntl
+import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -52,26 +52,24 @@ def airground_trace(tmp_path_factory: pytest.TempPathFactory) -> Simulations:
     read: dict[str, Trace] = {}
 
     def get(scenario: str | Path | Scenario, run: str, *, set: Overrides = ()) -> Trace:
+        from airground_drake.base import files
+        from airground_drake.scenario.load import resolved
         from airground_drake.sim import trace
         from airground_drake.sim.simulation import simulate
-        from airground_drake.study.testing.scenario import chosen, digest
+        from airground_drake.sim.tables import SCHEMA
+        from airground_drake.study.testing.assertions import chosen
 
         wanted = chosen(scenario, set)
-        key = digest(wanted, run)
+        # readable names, and a digest of all that the simulation depends on
+        key = re.sub(r"[^\w-]", "_", f"{wanted.name}-{run}", flags=re.ASCII)[:80]
+        key += f"-{files.sha256(json.dumps([SCHEMA, resolved(wanted), run]).encode())[:16]}"
         if key not in read:
             place = folder / key
-            with _alone(folder / f"{key}.lock"):
+            with (folder / f"{key}.lock").open("w") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)  # other workers wait
                 if not (place / "meta.json").exists():  # which is written last
                     trace.save(simulate(wanted, run), place)
             read[key] = trace.load(place)
         return read[key]
 
     return get
-
-
-@contextmanager
-def _alone(lock: Path) -> Iterator[None]:
-    """At most one process at a time holds the same lock."""
-    with lock.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

@@ -133,6 +133,7 @@ def scenarios(
     )
     speed = max(uav.max_speed_m_s, *(ugv.max_speed_m_s for ugv in team.values()))
     database = draw(DATABASES if policies is None else policies)
+    reach = _farthest(safe, own) + 2.0 * (largest + speed * period)  # and the way of two robots in one period
     return schema.Scenario(
         name="drawn",
         seed=draw(st.integers(0, 3)),
@@ -142,17 +143,12 @@ def scenarios(
         obstacles=rocks,
         arena_m=arena,
         safe_distance=safe,
-        control=draw(_controls(period, _reach(safe, own, largest, speed, period))),
+        control=draw(_controls(period, reach)),
         decision=draw(_decisions(period, triggers)),
         intervention=draw(_interventions(period, database)),
         gatekeeper=draw(_gatekeepers(period, routes)),
         runs={method: schema.Run(method, "augmented" if compositions is None else draw(compositions))},
     )
-
-
-def _reach(safe: schema.SafeDistance, own: float, radius: float, speed: float, period: float) -> float:
-    """A sensing range, m, that covers safe distances, radii and the way of two robots at this speed in one period."""
-    return _farthest(safe, own) + 2.0 * (radius + speed * period)
 
 
 def _farthest(safe: schema.SafeDistance, own: float) -> float:

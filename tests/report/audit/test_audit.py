@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from airground_drake.model.trigger import bayes
-from airground_drake.report.audit import companions, formulas, literal, readings, thresholds
-from airground_drake.report.audit.typeset import typeset
+from airground_drake.report.audit import companions, formulas, literal, thresholds
+from airground_drake.report.audit.item import typeset
 from airground_drake.scenario.load import load
 from airground_drake.ugv.solution import ConstantPlans
 from airground_drake.verify import Finding, cache_folder, judge_model
@@ -30,7 +30,7 @@ def from_formulas(proofs: dict[str, Finding]) -> list[dict[str, Any]]:
     return [
         *thresholds.threshold_findings(scenario, proofs),
         *formulas.formula_findings(scenario),
-        *readings.reading_findings(scenario),
+        *formulas.reading_findings(scenario),
     ]
 
 

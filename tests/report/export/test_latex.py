@@ -6,7 +6,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground_drake.report.export import latex
+from airground_drake.report.export import figures
 from airground_drake.report.model import Claim, Report, ReproductionRow
 
 NO: dict[str, Any] = {"as_expected": None, "evidence": {}, "inputs": {}}
@@ -34,14 +34,14 @@ def rows(table: str) -> list[list[str]]:
 
 
 def test_a_row_per_claim_and_per_result_of_the_paper() -> None:
-    table = latex.verdicts(REPORT)
+    table = figures.verdicts(REPORT)
     assert "claim & model & a & d\\_2 \\\\" in table
     assert rows(table) == [
         ["SAFE-INV", "proved", "", ""],
         ["ZENO-TRACE", "", "not tested", "holds"],
         ["SAFE-TRACE", "", "refuted", ""],
     ]
-    assert rows(latex.reproduction(REPORT)) == [
+    assert rows(figures.reproduction(REPORT)) == [
         ["A1", r"stall \& 5 \%", "(3.3, 5.1) m", "(3.369, 5.102) m", "not reproduced"],
         ["A3", "grows", "yes", "no", "calibrated"],
         ["A5", "trigger", "14.45 s", "--", "not reproduced"],
@@ -50,5 +50,5 @@ def test_a_row_per_claim_and_per_result_of_the_paper() -> None:
 
 @given(st.text())
 def test_no_special_character_is_left(text: str) -> None:
-    plain = re.sub(r"\\(text[a-z]+\{\}|ldots\{\}|[&%$#_{}])|\$\\[a-z]+\$|\$-\$", "", latex.escaped(text))
+    plain = re.sub(r"\\(text[a-z]+\{\}|ldots\{\}|[&%$#_{}])|\$\\[a-z]+\$|\$-\$", "", figures.escaped(text))
     assert not re.search(r"[\\~^<>|&%$#_{}\n]", plain)

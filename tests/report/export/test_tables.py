@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
-from airground_drake.report.export import tables
+from airground_drake.report.export import recording
 from airground_drake.sim.tables import TABLES
 
 
 def test_numbers_and_lists_read_back_equal(tmp_path: Path) -> None:
     trace = make_trace(make_scenario(), "c", GOING_ROUND, SUCCESS)
-    written = list(tables.write(trace, tmp_path))
+    written = list(recording.write(trace, tmp_path))
     names = (*TABLES, "events", "distances")
     assert [path.name for path in written] == [f"c_{name}.csv" for name in names]
     for path, table in zip(written, (trace.states, trace.samples), strict=False):

@@ -7,8 +7,7 @@ import pytest
 from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 
 from airground_drake.report.replay import scene as scenes
-from airground_drake.report.replay.proposals import Sent, Span
-from airground_drake.report.replay.scene import Scene
+from airground_drake.report.replay.scene import Scene, Sent, Span
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 

@@ -10,7 +10,6 @@ from pydrake.geometry import Meshcat, MeshcatAnimation
 
 from airground_drake.base.errors import ReplayError
 from airground_drake.report.replay import page as pages
-from airground_drake.report.replay import recording
 from airground_drake.report.replay.scene import Scene
 
 HOSTILE = "</script><script>alert(1)</script>"
@@ -48,9 +47,9 @@ def test_only_frames_that_change_something_are_kept(monkeypatch: pytest.MonkeyPa
         def SetTransform(self, frame: int, *rest: object) -> None:
             kept.append(frame)
 
-    monkeypatch.setattr(recording, "MeshcatAnimation", Counting)
+    monkeypatch.setattr(pages, "MeshcatAnimation", Counting)
     monkeypatch.setattr(Meshcat, "SetAnimation", lambda *_: None)
-    recording.recorded(replace(scene, robots=scene.robots[:1], proposals=()))
+    pages.recorded(replace(scene, robots=scene.robots[:1], proposals=()))
     corners = 9  # of the path, each between two frames
     assert 2 <= len(kept) <= 3 * corners
     assert (kept[0], kept[-1]) == (0, len(scene.times_s) - 1)
@@ -68,11 +67,11 @@ def test_nothing_is_drawn_where_a_body_was_not_recorded(monkeypatch: pytest.Monk
         def SetTransform(self, frame: int, path: str, *rest: object) -> None:
             moved.setdefault(path, []).append(frame)
 
-    monkeypatch.setattr(recording, "MeshcatAnimation", Noting)
+    monkeypatch.setattr(pages, "MeshcatAnimation", Noting)
     monkeypatch.setattr(Meshcat, "SetAnimation", lambda *_: None)
     positions = scene.robots[0].positions.copy()
     positions[100:120] = np.nan
-    meshcat = recording.recorded(replace(scene, robots=(replace(scene.robots[0], positions=positions),), proposals=()))
+    meshcat = pages.recorded(replace(scene, robots=(replace(scene.robots[0], positions=positions),), proposals=()))
     assert [meshcat.HasPath(f"/paths/0/{k}") for k in range(3)] == [True, True, False]
     assert shown["/robots/0"] == [(0, True), (100, False), (120, True)]
     assert {99, 120} <= set(moved["/robots/0"])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from airground_drake.report.replay.proposals import LINGER_S, sent
+from airground_drake.report.replay.scene import LINGER_S, sent
 from airground_drake.sim.trace import Trace
 
 

@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 
-from airground_drake.study.campaign.conduct import EVIDENCE, conduct
+from airground_drake.study.campaign.conduct import EVIDENCE, Stopping, conduct
 from airground_drake.study.campaign.rows import JUDGED, Row, blank
 from airground_drake.study.campaign.spec import Spec, load_spec
 from airground_drake.study.campaign.statistics import confidence_sequence
-from airground_drake.study.campaign.stopping import Stopping
 from airground_drake.study.campaign.store import read
 
 

@@ -11,6 +11,7 @@ import pytest
 from airground_drake.base import files
 from airground_drake.base.errors import UnknownNameError
 from airground_drake.commands.campaign import _code, _summary
+from airground_drake.study.campaign.conduct import InOrder, Stopping
 from airground_drake.study.campaign.evidence import evidence
 from airground_drake.study.campaign.page import page, told
 from airground_drake.study.campaign.rows import (
@@ -27,7 +28,6 @@ from airground_drake.study.campaign.rows import (
     blank,
 )  # fmt: skip
 from airground_drake.study.campaign.statistics import clopper_pearson, confidence_sequence
-from airground_drake.study.campaign.stopping import InOrder, Stopping
 from airground_drake.study.campaign.work import died
 
 NAN = float("nan")

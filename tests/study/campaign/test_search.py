@@ -10,7 +10,7 @@ from airground_drake.base.errors import ScenarioError
 from airground_drake.base.registry import SAMPLERS
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.study.campaign import shrink as module
-from airground_drake.study.campaign.objective import Margin, Most
+from airground_drake.study.campaign.falsification import Margin, Most
 from airground_drake.study.campaign.rows import JUDGED, Row, blank
 from airground_drake.study.campaign.search import Sampler
 from airground_drake.study.campaign.shrink import shrink
