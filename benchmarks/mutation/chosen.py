@@ -310,10 +310,10 @@ GATEKEEPER = (
     ),
     Mutant(
         "a withdrawal is not noticed before the next proposal",
-        "ugv/mpc_gatekeeper.py",
-        "Gatekeepers.idle",
-        "return not any(proposals) and not any(before.answers[::2])",
-        "return not any(proposals)",
+        "ugv/outcome_gatekeeper.py",
+        "OutcomeGatekeepers.asleep_until",
+        "if before.answers[2 * i] != SILENT:  # withdrawn",
+        "if before.answers[2 * i] == DONE:  # withdrawn",
         tests=ATTACKS,
     ),
     Mutant(
