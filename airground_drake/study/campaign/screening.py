@@ -1,6 +1,7 @@
 """Verdicts of array judges on a run of the loop, and what happened in it, from arrays or from a trace."""
 
 from collections.abc import Collection
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,7 +19,7 @@ def screened(loop: Batch, made: Going, claims: Collection[str]) -> list[Verdict]
     if not claims or not {*claims} <= {*SCREENED}:
         return []
     try:
-        findings = ArrayJudges(loop).findings(made.log, claims)
+        findings = _judges(loop).findings(made.log, claims)
     except NoScreenError:
         return []
     if len(findings) < len({*claims}):
@@ -28,6 +29,12 @@ def screened(loop: Batch, made: Going, claims: Collection[str]) -> list[Verdict]
         Verdict.of(claim, loop.name, findings[claim.id], expected.get(claim.id, claim.expected))
         for claim in run_claims(claims)
     ]
+
+
+@lru_cache(maxsize=1)
+def _judges(loop: Batch) -> ArrayJudges:
+    """The judges of a scenario's runs: other seeds have the same."""
+    return ArrayJudges(loop)
 
 
 def happened(loop: Batch, made: Going) -> Row:
