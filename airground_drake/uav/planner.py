@@ -156,18 +156,39 @@ class Planner:
         """The memory at the beginning of a run."""
         return PlannerState((Negotiation(),) * len(self.ugvs))
 
-    def asleep_until(self, memory: PlannerState, intervening: Sequence[bool]) -> float:
-        """Until when planning changes nothing, s, while the same UGVs are triggered; -inf: it may do so at once."""
+    def asleep_until(
+        self,
+        memory: PlannerState,
+        intervening: Sequence[bool],
+        answers: Sequence[float] | Array | None = None,
+        reports: Reports = (),
+    ) -> float:
+        """Until when planning changes nothing, s, while all this stays the same; -inf: it may do so at once."""
         # Without a proposal in force no answer is read. Then a negotiation changes only when its rest is over, or when
-        # neither its UGV nor its cause is triggered any more.
+        # neither its UGV nor its cause is triggered any more. A proposal stays while nobody answers, or with an
+        # acceptance that was read. Answers over a channel are not given: what is read there need not be the newest.
         called = {name for name, own in zip(self.ugvs, self._own(intervening), strict=True) if own}
+        newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         until = math.inf
-        for name, talk in zip(self.ugvs, memory.talks, strict=True):
-            if talk.proposal is not None or (talk != Negotiation() and called.isdisjoint((name, talk.cause))):
+        for i, (name, talk) in enumerate(zip(self.ugvs, memory.talks, strict=True)):
+            proposal = talk.proposal
+            if proposal is not None:
+                answer = REFUSE if answers is None else answer_to(proposal, answers, i)
+                unread = answer != SILENT and (reports[i].number > newest or reports[i].seen)
+                if answer in (REFUSE, DONE) or unread or self._comes_and_goes:
+                    return -math.inf
+                until = min(until, proposal.motion.end)
+            party = proposal.party if proposal else ()
+            if talk != Negotiation() and called.isdisjoint((name, talk.cause, *party)):
                 return -math.inf
-            if name in called:
+            if proposal is None and name in called:
                 until = min(until, talk.retry_at)
         return until
+
+    @cached_property
+    def _comes_and_goes(self) -> bool:
+        """Whether an outline on the map is not always there: then what is unknown changes with time."""
+        return bool((np.asarray(self.mapped_from) > 0.0).any() or np.isfinite(self.mapped_until).any())
 
     def _own(self, intervening: Sequence[bool]) -> list[bool]:
         """Which UGVs the UAV is to intervene on: those that are triggered and in its charge."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import abc
+import itertools
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from time import thread_time
@@ -49,10 +51,12 @@ class GatekeeperState:
     reports: Reports  # what each UGV last told the UAV about its proposal
     told: int = 0  # answers sent so far
     desk: Desk | None = None  # what was read and answered over a channel
-    decisions: tuple[GatekeeperDecision, ...] = ()  # those of the last sample that was not idle
+    decisions: tuple[GatekeeperDecision, ...] = ()  # those of the last sample with proposals, or of its repetition
     commitments: tuple[Commitment, ...] = ()  # under method (d), each UGV's tries and rests
     # under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m)
     sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    # of these, which are no news when they come into range: the UAV has heard of them, or nothing is asked of the UGV
+    quiet: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     # all decisions of the run so far
     made: History[GatekeeperDecision] = field(default_factory=History)
 
@@ -106,9 +110,37 @@ class Gatekeepers(abc.ABC):
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every proposal in force, with the state from the sample before."""
 
-    def idle(self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
-        """Whether a sample at t, s, changes nothing: no proposal, no answer to take back, nothing new to remember."""
-        return not any(proposals) and not any(before.answers[::2])
+    def asleep_until(self, proposals: Proposals, before: GatekeeperState) -> float:
+        """Until when samples only repeat the answers, s, while nothing new comes into range; -inf: one may do more."""
+        return -math.inf if any(proposals) or any(before.answers[::2]) else math.inf
+
+    def wakes(self, t: float, positions: Array, before: GatekeeperState) -> bool:
+        """Whether something in range at t, s, ends the sleep."""
+        return False
+
+    def kept(self, times: Sequence[float], proposals: Proposals, before: GatekeeperState) -> GatekeeperState:
+        """The state after samples at some times, s, that only repeat the answers."""
+        rows = [
+            [
+                GatekeeperDecision(
+                    t, i, proposal, answer_to(proposal, before.answers, i) == ACCEPT, "kept",
+                    tries=before.commitments[i].tries,
+                )
+                for i, proposal in enumerate(proposals) if proposal is not None
+            ]
+            for t in times
+        ]  # fmt: skip
+        if not any(rows):
+            return before
+        return replace(before, decisions=tuple(rows[-1]), made=before.made.plus([*itertools.chain(*rows)]))
+
+    def repeated(
+        self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState
+    ) -> GatekeeperState | None:
+        """The state after a sample at t, s, that only repeats the answers; None: it has to be made."""
+        if t >= self.asleep_until(proposals, before) or self.wakes(t, positions, before):
+            return None
+        return self.kept([t], proposals, before)
 
     def _in_range(self, t: float, position: Array) -> npt.NDArray[np.bool_]:
         """Which outlines at rest are there at time t, s, and within sensing range, (m,)."""

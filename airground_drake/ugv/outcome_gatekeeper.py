@@ -11,14 +11,18 @@ Each UGV judges its own part of a joint plan, and executes it when it accepts.
 Safety does not rest on this: an accepted motion is executed below the avoidance inequalities.
 """
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import cached_property
 from time import thread_time
 
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.kinds import ROBOTS
+from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.convex import news_within, within
@@ -56,11 +60,48 @@ class OutcomeGatekeepers(Gatekeepers):
         super().__init__(world, law, presets, unreported)
         self._outlook, self._patience = outlook, patience
         self._ugvs = world.names("ugv")
+        self._leaves = np.array([world.resting[k].disappears_s - 2.0 * SAME_S for k in world.owner])
 
-    def idle(self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState) -> bool:
-        """Whether a sample changes nothing."""
-        nothing = super().idle(t, proposals, positions, before)
-        return nothing and before.sensed is self._remembered(t, positions, before)
+    def asleep_until(self, proposals: Proposals, before: GatekeeperState) -> float:
+        """Until an executed proposal is over, tries count anew, or what is known is not there any more."""
+        # obstacles that move are news at every sample, unless the UAV sees them
+        if any(proposals) and self._reported:
+            return -math.inf
+        until = math.inf
+        if before.sensed.size:
+            until = float(self._leaves[before.sensed.any(axis=0)].min(initial=math.inf))
+        for i, (proposal, held) in enumerate(zip(proposals, before.commitments, strict=True)):
+            if proposal is None:
+                if before.answers[2 * i] != SILENT:  # withdrawn
+                    return -math.inf
+            elif answer_to(proposal, before.answers, i) == SILENT:
+                return -math.inf
+            elif held.executing:
+                until = min(until, held.until)
+            elif held.tries:
+                until = min(until, held.since + self._patience.rest)
+        return until
+
+    def wakes(self, t: float, positions: Array, before: GatekeeperState) -> bool:
+        """Whether an outline is in range that is not quiet."""
+        still, own = self._world.at(self._near, t).still, positions[self._near.members]
+        reach, quiet = self.law.avoidance.sensing_range, before.quiet
+        return quiet.shape != (len(own), len(still)) or bool(news_within(still, own, reach, True, quiet))
+
+    @cached_property
+    def _reported(self) -> bool:
+        """Whether UGVs report obstacles that move."""
+        return any(body.kind not in ROBOTS and body.name not in self.unreported for body in self._world.moving)
+
+    def _quiet(self, proposals: Proposals, after: GatekeeperState) -> npt.NDArray[np.bool_]:
+        """Which outlines in range are no news, (n, m)."""
+        quiet = after.sensed.copy()
+        for i, (proposal, report) in enumerate(zip(proposals, after.reports, strict=True)):
+            rows = np.flatnonzero(quiet[i])
+            if proposal is not None and len(rows):
+                told = np.array([outline.as_tuple(self._near.still[k]) in report.sensed for k in rows])
+                quiet[i, rows] = told | outline.is_among(self._near.still[rows], proposal.mapped)
+        return quiet
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every new proposal by its outcome; keep to the answer to every other."""
@@ -82,7 +123,8 @@ class OutcomeGatekeepers(Gatekeepers):
             i = decision.robot
             held[i] = self._after(held[i], decision, said[i])
             verdicts.append((replace(decision, tries=held[i].tries), _answer(decision, said[i])))
-        return replace(self._answered(now, known, verdicts), commitments=tuple(held))
+        after = replace(self._answered(now, known, verdicts), commitments=tuple(held))
+        return replace(after, quiet=self._quiet(now.proposals, after))
 
     def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
         """Which outlines each UGV has sensed up to time t, s, (n, m), and has not seen to be gone since."""

@@ -8,6 +8,7 @@ new proposal must be accepted while tries are left, also after every rest, and e
 
 import inspect
 from dataclasses import replace
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from airground_drake.scenario.load import load
 from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, answer_to
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv import outcome_gatekeeper
-from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
+from airground_drake.ugv.mpc_gatekeeper import GatekeeperState, Inputs
 from airground_drake.ugv.outcome import Outcome, Outlook
 from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers
 from airground_drake.ugv.patience import Patience
@@ -90,9 +91,10 @@ def _attack(name: str, patience: Patience, period: float) -> Outcomes:
             executed += period
             worst = max(worst, executed)
         positions = np.stack([place] * 3)
-        if not gatekeepers.idle(t, (proposal, None), positions, memory):
-            memory = gatekeepers.sample(Inputs(t, (proposal, None), positions, np.zeros((3, 3)), law), memory)
-            reasons |= {decision.reason for decision in memory.decisions}
+        repeated = gatekeepers.repeated(t, (proposal, None), positions, memory)
+        now = Inputs(t, (proposal, None), positions, np.zeros((3, 3)), law)
+        memory = gatekeepers.sample(now, memory) if repeated is None else repeated
+        reasons |= {decision.reason for decision in memory.decisions}
         accepted = answer_to(proposal, memory.answers, 0) == ACCEPT
         if before and not (accepted and proposal is asked):
             alone = t
@@ -190,7 +192,7 @@ def test_a_gatekeeper_that_miscounts_is_noticed(monkeypatch: pytest.MonkeyPatch,
     ("kind", "method", "wrong"),
     [
         (Patience, "rested", lambda _, now, __: now if now.executing else replace(now, tries=0)),  # needs no rest
-        (Gatekeepers, "idle", lambda _, t, proposals, *__: not any(proposals)),  # does not notice withdrawals
+        (OutcomeGatekeepers, "asleep_until", lambda _, asked, __: -inf if any(asked) else inf),  # misses withdrawals
         (Patience, "over", lambda _, now, t: t - PERIOD >= now.until),  # a sample late
         (Patience, "exhausted", lambda self, now: now.tries > self.most),  # a try too many
     ],

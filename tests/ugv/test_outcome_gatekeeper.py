@@ -34,9 +34,11 @@ class Team:
     def sees(self, proposal: Proposal | None, x: float = 20.0, other: Proposal | None = None) -> Commitment:
         self.t += 0.05
         places = np.array([[x, 0.0, 0.0], [0.0, 90.0, 0.0], [x, 0.0, 9.0]])
-        if not self.gate.idle(self.t, (proposal, other), places, self.memory):
+        repeated = self.gate.repeated(self.t, (proposal, other), places, self.memory)
+        if repeated is None:
             now = Inputs(self.t, (proposal, other), places, np.zeros((3, 3)), self.gate.law)
-            self.memory, self.calls = self.gate.sample(now, self.memory), self.calls + 1
+            repeated, self.calls = self.gate.sample(now, self.memory), self.calls + 1
+        self.memory = repeated
         return self.memory.commitments[0]
 
 

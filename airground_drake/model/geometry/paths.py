@@ -14,7 +14,7 @@ number x + iy.
 import math
 from bisect import bisect_right
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate
 from typing import Self
 
@@ -320,7 +320,7 @@ def _are_outermost(c: Points, r: Array) -> Flags:
 
 def _crossings(c: Points, r: Array) -> tuple[Points, Indices]:
     """The points where two circles cross, (n,), and the indices of the two circles, (2, n)."""
-    i, j = np.triu_indices(len(r), 1)
+    i, j = _pairs(len(r))
     d = abs(c[j] - c[i])
     real = (d > abs(r[i] - r[j])) & (d <= r[i] + r[j])
     i, j, d = i[real], j[real], d[real]
@@ -367,7 +367,7 @@ def _exit(p: complex, around: _Obstacles) -> complex:
     e = np.where(abs(p - c) > _EPS, p - c, 1.0)  # along +x from a centre
     u, length = (end - begin) / abs(end - begin), abs(end - begin)
     feet = begin + np.clip(((p - begin) * u.conj()).real, 0.0, length) * u
-    i, j = np.triu_indices(len(begin), 1)
+    i, j = _pairs(len(begin))
     with np.errstate(divide="ignore", invalid="ignore"):  # of parallel edges
         share = ((begin[j] - begin[i]) * u[j].conj()).imag / (u[i] * u[j].conj()).imag
     met = (share >= 0.0) & (share <= length[i])
@@ -378,28 +378,36 @@ def _exit(p: complex, around: _Obstacles) -> complex:
     return complex(min(candidates[around.clear(candidates)], key=lambda z: float(abs(z - p))))
 
 
+_SIDES = np.array([[1.0], [1.0], [-1.0], [-1.0]])  # 1 outer tangent, -1 inner
+_TURNS = np.array([1.0, -1.0, 1.0, -1.0])
+
+
+@lru_cache(maxsize=16)
+def _pairs(count: int) -> tuple[Indices, Indices]:
+    """Both members of all pairs of so many things; nothing writes to them."""
+    i, j = np.triu_indices(count, 1)
+    return i, j
+
+
 def _tangents(c: Points, r: Array, ways: Points) -> tuple[Points, Points, Indices]:
     """Both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points."""
     # A tangent that cuts the polygon about whose corner the circle is, is left out: the ways to the next corners,
     # (2, m), lead to its other side.
-    i, j = np.triu_indices(len(r), 1)
+    i, j = _pairs(len(r))
     apart = abs(c[j] - c[i])
-    tangents = []
-    for side, turn in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):  # side: 1 outer tangent, -1 inner
-        k = r[i] - side * r[j]
-        real = (apart >= abs(k) - _EPS) & (apart > 0.0)
-        if side < 0.0:
-            real &= i > 1  # a point has two tangents to a circle, not four
-        f, g, d, k = i[real], j[real], apart[real], k[real]
-        u = (c[g] - c[f]) / d
-        d = np.where(d - abs(k) <= _EPS, abs(k), d)  # touching
-        normal = (k + 1j * turn * np.sqrt((d - k) * (d + k))) / d * u
+    k = r[i] - _SIDES * r[j]
+    real = (apart >= abs(k) - _EPS) & (apart > 0.0)
+    real[2:] &= i > 1  # a point has two tangents to a circle, not four
+    which, pair = np.nonzero(real)
+    f, g, d, k, side, turn = i[pair], j[pair], apart[pair], k[real], _SIDES[which, 0], _TURNS[which]
+    u = (c[g] - c[f]) / d
+    d = np.where(d - abs(k) <= _EPS, abs(k), d)  # touching
+    normal = (k + 1j * turn * np.sqrt((d - k) * (d + k))) / d * u
+    if ways.any():
         inside = (normal * ways[:, f].conj()).real > _EPS, (side * normal * ways[:, g].conj()).real > _EPS
         out = ~(inside[0] | inside[1]).any(axis=0)
-        f, g, normal = f[out], g[out], normal[out]
-        tangents.append((c[f] + r[f] * normal, c[g] + side * r[g] * normal, np.array((f, g))))
-    a, b, on = zip(*tangents, strict=True)
-    return np.concatenate(a), np.concatenate(b), np.concatenate(on, axis=1)
+        f, g, normal, side = f[out], g[out], normal[out], side[out]
+    return c[f] + r[f] * normal, c[g] + side * r[g] * normal, np.array((f, g))
 
 
 def _rows(begin: Points, heading: Points, curvature: Array, length: Array) -> Array:
@@ -486,7 +494,8 @@ def _route(p: complex, q: complex, around: _Obstacles) -> Array | None:
     order = np.argsort(length, kind="stable")
     key, first = np.unique((tail * n + head)[order], return_index=True)
     edge = order[first]
-    graph = csr_array((length[edge], (tail[edge], head[edge])), shape=(n, n))
+    begins = np.searchsorted(tail[edge], np.arange(n + 1))
+    graph = csr_array((length[edge], head[edge].astype(np.int32), begins.astype(np.int32)), shape=(n, n))
     before = dijkstra(graph, indices=0, return_predecessors=True)[1]
     if before[1] < 0:
         return None

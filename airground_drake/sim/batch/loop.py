@@ -65,7 +65,7 @@ class Team(NamedTuple):
     due: Ints  # what is due then
     draws: Array  # the noise, (.., n)
     gated: bool  # whether UGVs judge proposals
-    remembers: bool  # whether they remember what they sensed
+    remembers: bool  # whether what they sense may be news
 
 
 class Around(NamedTuple):
@@ -90,11 +90,11 @@ class Accepted(NamedTuple):
 class State(NamedTuple):
     """What changes."""
 
-    # Now; when the trigger's step began; number of short steps in a row; until when the planner sleeps, (4,).
+    # Now; when the trigger's step began; number of short steps in a row; until when the planner sleeps, and until when
+    # the gatekeepers do, (5,).
     time: Array
     counts: Ints  # next tick, rows written, samples of noise used, what is due now, 1 after Python's update, (5,)
     called: Bools  # which UGVs were triggered when the planner fell asleep, (n,)
-    answers: Bools  # whether a UGV has something to answer, (1,)
     place: Array  # of all bodies that move, (M, 3), m
     noise: Array  # (n,), m
     drawn: Array  # the sample in force, (n,)
@@ -108,7 +108,7 @@ class State(NamedTuple):
     begun: Array  # signals of the decision block when its step began, (1 + 5n,)
     now: Array  # and now
     reference: Array  # (6n,)
-    known: Bools  # what each UGV has sensed, (n, m)
+    quiet: Bools  # what is no news to each UGV, (n, m)
 
 
 class Log(NamedTuple):
@@ -169,8 +169,8 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
     period, shortest, isolation, gain, leak, sensing = numbers
     ugvs, uav = around
     on, number, chosen, row_of, motion_t, motion_p, motion_v = accepted
-    time, counts, called, answers, place, noise, drawn, command, executing, share, heading = state[:11]
-    sampled, status, halts, held_begun, held_now, reference, known = state[11:]
+    time, counts, called, place, noise, drawn, command, executing, share, heading = state[:10]
+    sampled, status, halts, held_begun, held_now, reference, quiet = state[10:]
     log_t, log_bodies, log_command, log_reference, log_noise = log[:5]
     log_x, log_status, log_executing, log_signals, log_share = log[5:]
 
@@ -219,9 +219,9 @@ def advance(team: Team, around: Around, accepted: Accepted, state: State, log: L
                 for j in range(n):
                     awake = awake or (status[FIELDS * j] == INTERVENING) != called[j]
             if mask & GATE and gated and not awake:
-                awake = answers[0]
+                awake = t >= time[4]
                 if remembers and not awake:
-                    awake = known.shape != (n, len(still)) or news_within(still, place[:n], sensing, True, known)
+                    awake = quiet.shape != (n, len(still)) or news_within(still, place[:n], sensing, True, quiet)
             if awake:
                 code = PYTHON
                 break

@@ -176,10 +176,9 @@ class Batch:
         n, r, m = len(self.headings), len(self.world.robots), len(self.near.ugvs.still)
         due = int(self.team.due[0])
         return State(
-            time=np.array([0.0, 0.0, 0.0, np.inf]),
+            time=np.array([0.0, 0.0, 0.0, np.inf, np.inf]),
             counts=np.array([1, 0, 0, due, 0], dtype=np.int64),
             called=np.zeros(n, dtype=np.bool_),
-            answers=np.zeros(1, dtype=np.bool_),
             place=self.world.starts.copy(),
             noise=np.zeros(n),
             drawn=np.zeros(n),
@@ -193,7 +192,7 @@ class Batch:
             begun=np.zeros(1 + 5 * n),
             now=np.zeros(1 + 5 * n),
             reference=np.zeros(6 * n),
-            known=np.zeros((0, m), dtype=np.bool_),
+            quiet=np.zeros((0, m), dtype=np.bool_),
         )
 
     def new_log(self, rows: int) -> Log:
@@ -215,6 +214,7 @@ class Going:
         self._around = batch.near
         self._state, self._log, self._enter = batch.start(), batch.new_log(batch.rows), loop.BEGIN
         self._memory, self._answering = batch.planner.start(), GatekeeperState.empty(n)
+        self._judged_to = 0  # ticks at which all decisions are made
         self._executed: list[Proposal | None] = [None] * n
         self._accepted = _accepted(self._executed)
         self._ahead: PlannerState | None = None
@@ -273,7 +273,16 @@ class Going:
     @property
     def decided(self) -> Sequence[GatekeeperDecision]:
         """The decisions of the gatekeepers."""
+        self._catch_up(int(self._state.counts[0]) - (self._state.counts[3] != 0))  # what is due is still to be made
         return self._answering.made
+
+    def _catch_up(self, tick: int) -> None:
+        """Make the decisions of the ticks before a tick, which only repeat the answers."""
+        if self._batch.gatekeepers is not None and any(self._memory.proposals):
+            slept = slice(self._judged_to, tick)
+            times = self._team.ticks[slept][(self._team.due[slept] & loop.GATE) > 0].tolist()
+            self._answering = self._batch.gatekeepers.kept(times, self._memory.proposals, self._answering)
+        self._judged_to = tick
 
     def trace(self) -> Trace:
         """The trace of the run until now."""
@@ -317,19 +326,22 @@ class Going:
         batch, state, t = self._batch, self._state, self.t
         if state.counts[3] & loop.WATCH:
             self._around = Around(*(batch.world.at(near, t) for near in batch.near))
+        self._catch_up(int(state.counts[0]) - 1)
+        self._judged_to += 1
         try:
             ahead, self._ahead = self._ahead, None
             planned = (self._planned() if ahead is None else ahead) or self._memory
             answering = self._judged()
         except (Exception, SystemExit) as error:  # as Drake reports it
             raise SimulationError(batch.name, t, described(error)) from error
-        if answering.sensed is not self._answering.sensed:
-            self._state = state = state._replace(known=answering.sensed)
+        if answering.quiet is not self._answering.quiet:
+            self._state = state = state._replace(quiet=answering.quiet)
         self._memory, self._answering = planned, answering
         answers = self._answers()
         state.called[:] = state.status[::FIELDS] == INTERVENING
-        state.time[3] = batch.planner.asleep_until(planned, state.called.tolist())
-        state.answers[0] = self._team.gated and (any(planned.proposals) or any(answers[::2]))
+        state.time[3] = batch.planner.asleep_until(planned, state.called.tolist(), answers, answering.reports)
+        if batch.gatekeepers is not None:
+            state.time[4] = batch.gatekeepers.asleep_until(planned.proposals, answering)
         now = accepted_proposals(planned.proposals, np.array(answers))
         if any(one is not other for one, other in zip(now, self._executed, strict=True)):
             self._executed, self._accepted = now, _accepted(now)
@@ -339,13 +351,14 @@ class Going:
         """What the planner remembers after planning at this instant; None at another time, or if nothing changes."""
         batch, state, t, memory = self._batch, self._state, self.t, self._memory
         intervening = (state.status[::FIELDS] == INTERVENING).tolist()
-        if not state.counts[3] & loop.PLAN or t < batch.planner.asleep_until(memory, intervening):
+        answers, reports = self._answers(), self._answering.reports
+        if not state.counts[3] & loop.PLAN or t < batch.planner.asleep_until(memory, intervening, answers, reports):
             return None
         places = state.place.copy()
         stands = standing(watched(state.halts, t, places.reshape(-1), self._team.room), t).tolist()
         planned = batch.planner.plan(
-            memory, t, places[: len(batch.world.robots)], intervening, np.array(self._answers()),
-            self._answering.reports, stands, sightings(batch.world, t, places),
+            memory, t, places[: len(batch.world.robots)], intervening, np.array(answers), reports, stands,
+            sightings(batch.world, t, places),
         )  # fmt: skip
         return sent_after(memory, planned, t, batch.planner.sender)
 
@@ -354,8 +367,10 @@ class Going:
         batch, state, t, before = self._batch, self._state, self.t, self._answering
         proposals, places = self._memory.proposals, state.place.copy()
         gate = batch.gatekeepers if state.counts[3] & loop.GATE else None
-        if gate is None or gate.idle(t, proposals, places, before):
+        if gate is None:
             return before
+        if (repeated := gate.repeated(t, proposals, places, before)) is not None:
+            return repeated
         period = float(self._team.numbers[0])
         headings = loop.headings_at(t, state, self._team.steering, period) if self._team.turns else None
         velocities = batch.world.velocities(t, state.command.copy())

@@ -113,18 +113,19 @@ class Gatekeeper(LeafSystem):
         desk = None if self._retry is None else self._now(context)
         proposals = self._proposals.Eval(context) if desk is None else desk.held
         positions = self._bodies.Eval(context).reshape(-1, 3)
-        idle = self._gatekeepers.idle(context.get_time(), proposals, positions, before)
-        if idle and desk is before.desk:
+        t = context.get_time()
+        after = self._gatekeepers.repeated(t, proposals, positions, before)
+        if after is before and desk is before.desk:
             return EventStatus.DidNothing()
-        velocities = self._world.velocities(context.get_time(), self._command.Eval(context).reshape(-1, 3))
-        law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())
-        headings = None if self._headings is None else self._headings.Eval(context)
-        now = Inputs(context.get_time(), proposals, positions, velocities, law, headings)
-        after = self._gatekeepers.sample(now, before)
+        if after is None:
+            velocities = self._world.velocities(t, self._command.Eval(context).reshape(-1, 3))
+            law = self._gatekeepers.law.with_gains(*self._gains.Eval(context).tolist())
+            headings = None if self._headings is None else self._headings.Eval(context)
+            after = self._gatekeepers.sample(Inputs(t, proposals, positions, velocities, law, headings), before)
         if desk is not None and self._retry is not None:
             new = self._inbox.Eval(context)[len(self.desk(context).read_s) :]
             asked = {delivery.message.ugv for delivery in new}
-            desk, told = replied(desk, asked, after.answers, after.reports, after.told, now.t, self._retry)
+            desk, told = replied(desk, asked, after.answers, after.reports, after.told, t, self._retry)
             after = replace(after, desk=desk, told=told)
         state.get_mutable_abstract_state(self._state).set_value(after)
         return EventStatus.Succeeded()

@@ -145,10 +145,10 @@ class InterventionPlanner(LeafSystem):
         if t >= self._planner.lost_at - SAME_S:
             return self._planner.lost(before, t)
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
-        if t < self._planner.asleep_until(before, intervening):
+        answers, reports = self._answered(context)
+        if t < self._planner.asleep_until(before, intervening, None if self._channel else answers, reports):
             return None
         bodies = self._bodies.Eval(context).reshape(-1, 3)
-        answers, reports = self._answered(context)
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         moving = sightings(self._world, t, bodies)
         others = () if self._others is None else self._others.Eval(context)

@@ -6,7 +6,7 @@ import json
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -225,7 +225,7 @@ def screened(loop: Batch, made: Going, claims: Collection[str]) -> list[Verdict]
     if not claims or not {*claims} <= {*array_judges.SCREENED}:
         return []
     try:
-        findings = ArrayJudges(loop).findings(made.log, claims)
+        findings = _judges(loop).findings(made.log, claims)
     except NoScreenError:
         return []
     if len(findings) < len({*claims}):
@@ -235,6 +235,12 @@ def screened(loop: Batch, made: Going, claims: Collection[str]) -> list[Verdict]
         Verdict.of(claim, loop.name, findings[claim.id], expected.get(claim.id, claim.expected))
         for claim in run_claims(claims)
     ]
+
+
+@lru_cache(maxsize=1)
+def _judges(loop: Batch) -> ArrayJudges:
+    """The judges of a scenario's runs: other seeds have the same."""
+    return ArrayJudges(loop)
 
 
 def happened(loop: Batch, made: Going) -> Row:

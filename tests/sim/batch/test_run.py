@@ -18,6 +18,9 @@ from airground_drake.sim.batch import noise
 from airground_drake.sim.batch.run import Batch
 from airground_drake.sim.simulation import Recorder, simulate
 from airground_drake.study.testing.strategies import scenarios
+from airground_drake.uav.planner import Planner
+from airground_drake.ugv.mpc_gatekeeper import Gatekeepers
+from airground_drake.ugv.outcome_gatekeeper import OutcomeGatekeepers
 
 
 def differences(scenario: Scenario, run: str, seeds: range = range(1)) -> list[object]:
@@ -61,6 +64,34 @@ def test_odd_settings(changes: list[str], run: str) -> None:
 def test_drawn_scenarios(scenario: Scenario) -> None:
     for run in scenario.runs:
         assert differences(scenario, run) == []
+
+
+def sleepless(scenario: Scenario, run: str) -> object:
+    """The first difference of Drake's run to one in which planner and gatekeepers never sleep."""
+    awake = simulate(scenario, run)
+    with pytest.MonkeyPatch.context() as patch:
+        for kind in (Planner, Gatekeepers, OutcomeGatekeepers):
+            patch.setattr(kind, "asleep_until", lambda *_: -np.inf)
+        return first_difference(simulate(scenario, run), awake)
+
+
+@pytest.mark.parametrize("name", ["case_a", "noisy_link"])
+def test_nobody_sleeps_too_long(name: str) -> None:
+    assert sleepless(load(name, ["reproduction=[]"]), "d") is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["lab", "crossing", "two_uavs", "warehouse"])
+def test_nobody_sleeps_too_long_in_a_team(name: str) -> None:
+    assert sleepless(load(name), "d") is None
+
+
+@pytest.mark.slow
+@given(scenarios())
+@settings(max_examples=15)
+def test_nobody_sleeps_too_long_in_drawn_scenarios(scenario: Scenario) -> None:
+    for run in scenario.runs:
+        assert sleepless(scenario, run) is None
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 7), st.integers(1, 40))
