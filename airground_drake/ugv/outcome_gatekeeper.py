@@ -91,7 +91,7 @@ class OutcomeGatekeepers(Gatekeepers):
     @cached_property
     def _reported(self) -> bool:
         """Whether UGVs report obstacles that move."""
-        return any(body.kind not in ROBOTS and body.name not in self.unreported for body in self._world.moving)
+        return any(body.kind not in ROBOTS and body.name not in self._unreported for body in self._world.moving)
 
     def _quiet(self, proposals: Proposals, after: GatekeeperState) -> npt.NDArray[np.bool_]:
         """Which outlines in range are no news, (n, m)."""
