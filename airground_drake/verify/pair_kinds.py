@@ -94,8 +94,7 @@ def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
 def _kinds(scenario: Scenario) -> Iterator[PairKind]:
     """The extreme pairs of each kind in `SHARES`: the hypotheses hold for all pairs if they hold for these."""
     # Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
-    about = scenario.control, scenario.position_error_m
-    robots = {name: _Robot.of(robot, *about) for name, robot in scenario.robots.items()}
+    robots = {name: _Robot.of(robot, scenario.control, scenario.seen(name)) for name, robot in scenario.robots.items()}
     asked = {(pair.kind, robots[pair.first], robots.get(pair.second), *pair[3:]) for pair in apart(scenario)}
     pairs: dict[str, set[tuple[Fraction, Fraction]]] = {kind: set() for kind in SHARES}
     for kind, own, other, required, (_, radius) in asked:
@@ -121,8 +120,8 @@ class _Robot(NamedTuple):
     gain_1_s: float
 
     @classmethod
-    def of(cls, robot: Ugv | Uav, control: Control, error_m: float) -> _Robot:
-        bounds = bounds_of(robot, control.period_s, error_m)
+    def of(cls, robot: Ugv | Uav, control: Control, seen: dict[str, Any]) -> _Robot:
+        bounds = bounds_of(robot, control.period_s, seen)
         return cls(decimal(robot.radius_m), decimal(robot.max_speed_m_s), bounds, control.avoidance_gain_1_s)
 
     def beside(self, other: _Robot | None, safe_m: Fraction) -> tuple[Fraction, Fraction]:
