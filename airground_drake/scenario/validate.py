@@ -646,6 +646,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _uavs, _charges, _channel, _ugv_links, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets,
-    _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget, _reproduction, _choices,
+    _uavs, _charges, _channel, _ugv_links, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants,
+    _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget,
+    _reproduction, _choices,
 )  # fmt: skip

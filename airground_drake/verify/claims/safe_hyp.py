@@ -129,8 +129,8 @@ class SafeHyp(TraceClaim):
         "may move the passive law held, and it moved no faster than declared: so d was kept in every period that "
         "began at d + V h or more. The controllers were built with what the scenario says; one of the user's own is "
         "judged by its steps alone. Where robots act on measured positions, the inequalities are those of the pair as "
-        "measured, errors were within their bound, and d is that of the true bodies. Where messages between UGVs may be "
-        "lost, a UGV stood unless it knew that those whose message it lacked were far."
+        "measured, errors were within their bound, and d is that of the true bodies. Where messages between UGVs may "
+        "be lost, a UGV stood unless it knew that those whose message it lacked were far."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -153,8 +153,8 @@ class SafeHyp(TraceClaim):
         "them, and keeps what all of them keep. The distances promised are listed less the radii. The parameters of "
         "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
         "apart count as one instant. With errors of positions D and n are those of measured ones and steps are true: a "
-        "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands. The "
-        "same holds for two robots of which one may lack the other's message."
+        "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands. "
+        "The same holds for two robots of which one may lack the other's message."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
