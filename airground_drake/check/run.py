@@ -11,7 +11,19 @@ import pandas as pd
 from .files import Json, parse_table, read_bytes, read_json, sha256
 from .plants import Rows, Way, misses_as_recorded, moves_as_its_plant, own_of, plants_of, unicycle_of
 from .rules import SMALL, Array, NotEstablished, close, holds, same
-from .scenario import Levels, Pair, Preset, as_run, levels_of, moving_of, pairs_of, places_of, preset_of, robots_of
+from .scenario import (
+    Levels,
+    Pair,
+    Preset,
+    as_run,
+    levels_of,
+    links_of,
+    moving_of,
+    pairs_of,
+    places_of,
+    preset_of,
+    robots_of,
+)
 from .shapes import boxes_of
 
 SCHEMA = "airground_drake.trace/10"
@@ -169,9 +181,16 @@ class Run:
         """How far measured positions may be off, m."""
         return float((self.scenario.get("sensing") or {}).get("position_error_m", 0.0))
 
+    @cached_property
+    def links(self) -> dict[str, float]:
+        """Delay, s, and loss of positions between UGVs."""
+        return links_of(self.scenario)
+
     def seen_m(self, robot: str) -> Array:
-        """Measured positions of a robot at the control samples, (S, 3), m."""
-        return self.sampled(robot, "seen_", "m")
+        """Positions of a robot that robots act on at the control samples, (S, 3), m."""
+        if self.scenario.get("sensing") or self.links["delay_s"]:
+            return self.sampled(robot, "seen_", "m")
+        return self.position_m[robot][self.sample_row]
 
     def times_s(self, robot: str, kind: str) -> Array:
         """Times of the recorded events of a kind, increasing."""

@@ -210,7 +210,7 @@ def shortfalls_m(
 
 def gain_of_pair(pair: Pair, gain: Fraction) -> Fraction:
     """The gain with which a pair meets the law: half of A h where one of two robots may stand."""
-    return gain * Fraction(pair.share) if pair.error_m else gain
+    return gain * Fraction(pair.share) if pair.halved else gain
 
 
 def measured_shortfall_m(run: Run, law: Pair, rows: Rows, gain: Fraction, last: Fraction) -> Fraction:
@@ -249,6 +249,7 @@ def safe_hyp(run: Run) -> Found:
     try:
         _constants(run)
         _motion(run)
+        _without_message(run)
         for pair in run.pairs:
             law = pair.in_the_law
             near = law.safe_m + pair.cover_m + pair.closing_m_s * period + FAR_M
@@ -262,7 +263,7 @@ def safe_hyp(run: Run) -> Found:
                 missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last)) - pair.slip_m
                 about = f"{pair.robot}, {pair.other}"
                 holds("passive law", missed <= SMALL, missed, "0 m missed", about=about)
-            elif pair.error_m:
+            elif pair.error_m or pair.halved:
                 lacks = measured_shortfall_m(run, law, rows, gain_of_pair(pair, gain), last)
                 lost = max(lost, lost_m(lacks, gain_of_pair(pair, gain), len(run.sample_row)) - pair.drift_m)
             else:
@@ -347,6 +348,9 @@ def _motion(run: Run) -> None:
             off = np.linalg.norm(run.seen_m(robot) - place[run.sample_row], axis=1)
             most = f"{run.error_m} m at most"
             holds("error of the measured position", off <= run.error_m, off, most, about=robot, t_s=run.sample_s)
+        elif run.links["delay_s"]:
+            seen = run.seen_m(robot)
+            close("announced position", seen, place[run.sample_row], within=SMALL, about=robot, t_s=run.sample_s)
         if robot in run.ugvs:
             close("planar motion", place[:, 2], np.full(len(place), place[0, 2]), within=0.0, about=robot, t_s=run.t_s)
     for name in run.moving:
@@ -355,3 +359,23 @@ def _motion(run: Run) -> None:
         speed = np.linalg.norm(np.diff(run.position_m[name][rows], axis=0), axis=1) / np.diff(run.t_s[rows])
         slow = speed <= expected + SMALL / run.scenario["control"]["period_s"]
         holds("declared speed", slow, speed, f"{expected} at most", about=name, t_s=run.t_s[rows[:-1]])
+
+
+def _without_message(run: Run) -> None:
+    """A UGV that lacks the message of another one at a sample stands, unless it knows that the other one is far."""
+    if not run.links["loss"]:
+        return
+    period_s = float(run.scenario["control"]["period_s"])
+    for pair in (pair.in_the_law for pair in run.pairs if pair.robot in run.ugvs and pair.other in run.ugvs):
+        for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
+            heard_s = column_of(run.samples, f"{robot}.heard_{other}_s")
+            sample = np.searchsorted(run.sample_s, heard_s - SMALL).clip(0, len(heard_s) - 1)
+            apart_m = np.linalg.norm(run.seen_m(robot) - run.seen_m(other)[sample], axis=1)
+            fastest = [run.robots[name]["max_speed_m_s"] + (own_of(run.robots[name]) or {}).get("drift_m_s", 0.0)
+                       for name in (robot, other)]  # fmt: skip
+            far = apart_m - fastest[1] * (run.sample_s - heard_s) >= pair.safe_m + sum(fastest) * period_s - SMALL
+            way_m = period_s * np.linalg.norm(run.sampled(robot, "v", "m_s"), axis=1)
+            knows = far | (heard_s >= run.sample_s - SMALL)
+            about = f"{robot}, {other}"
+            stands = knows | (way_m <= SMALL)
+            holds("standing without a message", stands, way_m, "0 m in a period", about=about, t_s=run.sample_s)

@@ -37,6 +37,7 @@ class Pair(NamedTuple):
     drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
     slip_m: float = 0.0  # how much of its command the robot may miss in a period
     error_m: float = 0.0  # how far the measured relative position may be off: then the law acts on that one
+    halved: bool = False  # whether one of two robots may stand, so that the pair meets the law with half the gain
     # For how long from the start on the bodies have to be clear by themselves, since commands given before lead them;
     # None where their steered points say enough.
     start_s: float | None = None
@@ -180,13 +181,22 @@ def pairs_of(scenario: Json) -> list[Pair]:
     room = {name: taken(robot, scenario["control"]) for name, robot in robots.items()}
     with_plants = [_with_plants(pair, room) for pair in beside_obstacles + beside_robots]
     error_m = float((scenario.get("sensing") or {}).get("position_error_m", 0.0))
-    return [_as_measured(pair, error_m) for pair in with_plants] if error_m else with_plants
+    lossy = links_of(scenario)["loss"] > 0.0
+    seen = [pair._replace(halved=pair.share < 1.0 and (error_m > 0.0 or (lossy and pair.robot in scenario["ugvs"])))
+            for pair in with_plants]  # fmt: skip
+    return [_as_seen(pair, error_m) if error_m or pair.halved else pair for pair in seen]
 
 
-def _as_measured(pair: Pair, error_m: float) -> Pair:
+def links_of(scenario: Json) -> dict[str, float]:
+    """Delay, s, and loss of positions between UGVs."""
+    given = (scenario.get("channel") or {}).get("ugvs") or {}
+    return {key: float(given.get(key, 0.0)) for key in ("delay_s", "loss")}
+
+
+def _as_seen(pair: Pair, error_m: float) -> Pair:
     """A pair whose law acts on measured positions: e + sqrt(m^2 + e^2), and a drift at the gain of the pair."""
     # Of two robots one may stand: the pair then meets the law with half the gain, and a drift costs twice as much.
-    robots = 1 if pair.share == 1.0 else 2
+    robots = 2 if pair.halved else 1
     error_m, drift_m = robots * error_m, robots * pair.drift_m
     undrifting = pair.safe_m + pair.more_m - pair.drift_m
     law_m = error_m + math.hypot(undrifting, error_m) + drift_m

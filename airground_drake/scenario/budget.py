@@ -72,7 +72,7 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
     safe, gain = scenario.safe_distance, scenario.control.avoidance_gain_1_s
     bounds, cover = dict[str, Bounds](), dict[str, str]()
     for name, robot in scenario.robots.items():
-        bounds[name] = bounds_of(robot, scenario.control.period_s, scenario.position_error_m)
+        bounds[name] = bounds_of(robot, scenario.control.period_s, scenario.seen(name))
         cover[name] = plant_of(robot, scenario.control.period_s).cover_key
 
     def of_pair(first: str, second: str, kind: str, promised: float, radii: float) -> PairBudget:

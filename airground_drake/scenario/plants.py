@@ -58,9 +58,9 @@ def plant_of(robot: _Robot, period_s: float) -> Plant:
     return plant or FirstOrder()
 
 
-def bounds_of(robot: Any, period_s: float, error_m: float) -> Bounds:
-    """How far a robot of a scenario may be from where the law steers it, and from where it is seen."""
-    return plant_of(robot, period_s).bounds(robot.max_speed_m_s)._replace(error_m=error_m)
+def bounds_of(robot: Any, period_s: float, seen: dict[str, Any]) -> Bounds:
+    """How far a robot of a scenario may be from where the law steers it, and what is `seen` of it."""
+    return plant_of(robot, period_s).bounds(robot.max_speed_m_s)._replace(**seen)
 
 
 def made(given: list[dict[str, Any]], period_s: float) -> Plant:

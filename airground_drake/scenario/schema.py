@@ -506,12 +506,28 @@ class WayBack:
 
 
 @dataclass(slots=True)
+class UgvLinks:
+    """How late and how often UGVs hear where the other UGVs are; without it they always know.
+
+    A UGV publishes at a control sample where it will be at the next one, so a delay of up to a control period costs
+    nothing. It stands in a period in which it lacks a message of another UGV, unless that one is surely far: the last
+    position that it knows, less what the other may have driven since, is farther than the law asks for. Starts are
+    known. Predictions of gatekeepers take all messages for received.
+    """
+
+    delay_s: NotNegative = 0.0
+    """How late a position is; at most the control period."""
+    loss: Loss = 0.0
+    """Share of positions that are lost, by receiver."""
+
+
+@dataclass(slots=True)
 class Channel:
     """What happens to messages between UAVs and UGVs. Without it they arrive at once, and none is lost.
 
     The fate of a message depends on `seed`, its link, its number and how often it was sent before, and on nothing else:
     with another delay the same messages are lost. Who waits for an answer repeats the message after twice the delay,
-    the jitter and 0.15 s. Robots see each other as they are: distances do not depend on messages.
+    the jitter and 0.15 s. Robots see each other as they are, UGVs only without `ugvs`.
     """
 
     delay_s: NotNegative = 0.0
@@ -530,6 +546,8 @@ class Channel:
     """Decides which messages are lost, doubled and late."""
     up: WayBack | None = None
     """The way back, from UGVs to the UAV; by default it is as the way there."""
+    ugvs: UgvLinks | None = None
+    """The positions of UGVs on their way to other UGVs; the same in all runs."""
 
 
 @dataclass(slots=True)
@@ -613,7 +631,7 @@ class Choice:
 
 def _written(items: list[tuple[str, Any]]) -> dict[str, Any]:
     """A mapping of a file, without optional keys that are left out."""
-    return {key: value for key, value in items if key not in OPTIONAL or value != OPTIONAL[key]}
+    return {key: value for key, value in items if not (key in OPTIONAL and (value is None or value == OPTIONAL[key]))}
 
 
 @dataclass(slots=True)
@@ -694,6 +712,26 @@ class Scenario:
     def position_error_m(self) -> float:
         """Bound of the error of a robot's published position, m; 0 without errors."""
         return self.sensing.position_error_m if self.sensing else 0.0
+
+    @property
+    def ugv_links(self) -> UgvLinks | None:
+        """What happens to positions on their way between UGVs; None: nothing."""
+        return self.channel.ugvs if self.channel else None
+
+    @property
+    def publishes(self) -> bool:
+        """Whether robots act on positions that are published, not on true ones."""
+        return self.sensing is not None or self.announces
+
+    @property
+    def announces(self) -> bool:
+        """Whether UGVs publish where they will be at the next control sample."""
+        return self.ugv_links is not None and self.ugv_links.delay_s > 0.0
+
+    def seen(self, robot: str) -> dict[str, Any]:
+        """What the bounds of a robot's motion say about what is known: `error_m` and `may_stand`."""
+        lossy = self.ugv_links is not None and self.ugv_links.loss > 0.0
+        return {"error_m": self.position_error_m, "may_stand": lossy and robot in self.ugvs}
 
     @property
     def barriers(self) -> dict[str, Obstacle]:

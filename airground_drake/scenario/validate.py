@@ -85,6 +85,26 @@ def _charges(scenario: Scenario) -> Problems:
             yield f"ugvs.{ugv}", Fault("in no UAV's charge"), allowed
 
 
+def _ugv_links(scenario: Scenario) -> Problems:
+    """Positions arrive within a control period, of UGVs that are where they say; the law of the package hears them."""
+    if (link := scenario.ugv_links) is None:
+        return
+    if scenario.ugv_controller is not None:
+        yield "channel.ugvs", Fault("with ugv_controller"), "left out: a controller of your own knows all positions"
+    for run, spec in scenario.runs.items():
+        for key, value in spec.set.items():
+            if key.startswith("channel.ugvs"):
+                yield f"runs.{run}.set.{key}", value, "the same in all runs: distances rest on it"
+    period_s = scenario.control.period_s
+    if decimal(link.delay_s) > decimal(period_s):
+        told = f"at most control.period_s = {period_s:.9g} s: a robot publishes where it will be a period later"
+        yield "channel.ugvs.delay_s", link.delay_s, f"{told}; control.period_s = {link.delay_s:.9g} would do"
+    for name, robot in scenario.robots.items() if link.delay_s else ():
+        if missed := plant_of(robot, period_s).bounds(robot.max_speed_m_s).drift_m_s:
+            key, told = f"{scenario.key_of(name)}.plant.drift_m_s", "0 with channel.ugvs.delay_s"
+            yield key, missed, f"{told}: {name} is not where it said that it would be"
+
+
 def _names(scenario: Scenario) -> Problems:
     keys = [(f"ugvs.{name}", name) for name in scenario.ugvs]
     keys += [(f"uavs.{name}" if scenario.uavs else "uav.name", name) for name in scenario.aerial]
@@ -614,6 +634,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _uavs, _charges, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants, _presets, _ends,
-    _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget, _reproduction, _choices,
+    _uavs, _charges, _ugv_links, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants,
+    _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget,
+    _reproduction, _choices,
 )  # fmt: skip

@@ -18,9 +18,8 @@ def make_world(scenario: Scenario) -> World:
     """All bodies of a scenario, and the distances that they keep."""
     safe = scenario.safe_distance
     control = scenario.control
-    about = control.period_s, scenario.position_error_m
-    robots = [_robot(name, "ugv", ugv, *about) for name, ugv in scenario.ugvs.items()]
-    robots += [_robot(name, "uav", uav, *about) for name, uav in scenario.aerial.items()]
+    robots = [_robot(scenario, name, "ugv", ugv) for name, ugv in scenario.ugvs.items()]
+    robots += [_robot(scenario, name, "uav", uav) for name, uav in scenario.aerial.items()]
     obstacles = [_obstacle(scenario, name, body) for name, body in scenario.barriers.items()]
     obstacles.sort(key=lambda body: body.plant is None)
     apart: dict[frozenset[Kind], float] = {
@@ -42,8 +41,8 @@ def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:
     )  # fmt: skip
 
 
-def _robot(name: str, kind: Kind, given: Ugv | Uav, period_s: float, error_m: float) -> Body:
-    plant = plant_of(given, period_s)
+def _robot(scenario: Scenario, name: str, kind: Kind, given: Ugv | Uav) -> Body:
+    plant = plant_of(given, scenario.control.period_s)
     start = plant.steered(np.array(given.start_m, dtype=np.float64))
     shape = outline.balls(np.zeros(3), given.radius_m)
-    return Body(name, kind, start, shape, plant, given.max_speed_m_s, error_m=error_m)
+    return Body(name, kind, start, shape, plant, given.max_speed_m_s, **scenario.seen(name))

@@ -42,6 +42,7 @@ from airground_drake.sim.blocks import (
 )
 from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvController
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
+from airground_drake.sim.blocks.positions import positions_between
 from airground_drake.sim.blocks.sensing import Errors, PositionSensing
 
 # Exported output ports of the diagram: the signals of a trace.
@@ -49,8 +50,8 @@ RECORDED = (
     "bodies", "team_command", "reference", "noise", "decision_variable", "status", "executing",
 )  # fmt: skip
 # Further exported output ports: of robots that are not where the law steers them, of users' plants that have a heading,
-# of unicycles, and of measured positions.
-OF_SOME = ("plant_signals", "own_headings", "command_share", "published", "seen_by_uav")
+# of unicycles, of measured positions, and of positions that go from UGV to UGV.
+OF_SOME = ("plant_signals", "own_headings", "command_share", "published", "seen_by_uav", "announced", "heard_s")
 
 NO_NAMES: Mapping[str, str] = MappingProxyType({})
 NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
@@ -161,13 +162,15 @@ def build_model(
     answering = gatekeeper or DirectAcceptance(n, channel_period=period if channel else None)
     answers = {port.get_name(): port for port in _outputs(answering) if not (channel and port.get_name() == "reports")}
     own = scenario.ugv_controller
-    ugvs = OwnUgvController(own, world, law, ugv_controller) if own else UgvController(world, law)
+    between = positions_between(scenario, world, law)
+    ugvs = OwnUgvController(own, world, law, ugv_controller) if own else between.controller
     uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
-    # input ports of the parts for which `bodies` are positions as measured
-    measured = {"bodies": "published"} if scenario.sensing else {}
+    # input ports of the parts for which `bodies` are positions as published, and as the UAV sees them
+    measured = {} if between.published == "bodies" else {"bodies": between.published}
+    seen = {"bodies": "seen_by_uav"} if scenario.sensing else {}
     parts = {
         "decision_making": decision,
-        "task_planning": _task_planning(presets, planners, ugvs, uavs, measured),
+        "task_planning": _task_planning(presets, planners, ugvs, uavs, measured, seen),
         "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers, renamed={answering: measured}),
         "vehicles": vehicles,
     }
@@ -179,6 +182,7 @@ def build_model(
         parts |= {"downlink": links[0], "uplink": links[1]}
     if scenario.sensing:
         parts["sensing"] = PositionSensing(Errors(scenario.sensing, world), world)
+    parts |= between.parts
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
@@ -186,7 +190,7 @@ def build_model(
         ugvs.require_inputs(named)
     recorded = (*RECORDED, *(name for name in OF_SOME if name in named))
     exported = [*recorded, *(["violation"] if monitor is not None else [])]
-    diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported)
+    diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported, renamed=between.renamed)
     return Model(
         diagram=diagram,
         world=world,
@@ -243,6 +247,7 @@ def _task_planning(
     ugvs: UgvController | OwnUgvController,
     uavs: Mapping[str, UavController],
     measured: Mapping[str, str],
+    seen: Mapping[str, str],
 ) -> Diagram:
     """The task planning layer: preset trajectories, planners, controllers."""
     times, places = components.stack_presets(list(presets))
@@ -277,7 +282,7 @@ def _task_planning(
         "uav_command": flies.get_output_port(0),
     }
     renamed: dict[System, Mapping[str, str]] = dict.fromkeys([ugvs, *uavs.values()], measured)
-    renamed |= dict.fromkeys(planners.values(), dict.fromkeys(measured, "seen_by_uav"))
+    renamed |= dict.fromkeys(planners.values(), seen)
     return _assembled("task_planning", systems, named, None, wires, renamed=renamed)
 
 

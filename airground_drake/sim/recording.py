@@ -150,8 +150,8 @@ def samples(
     columns: dict[str, Array] = {"t_s": t[at]}
     for i, robot in enumerate(robots):
         columns |= {f"{robot}.v{axis}_m_s": chosen[3 * i + a] for a, axis in enumerate("xyz")}
-        if "published" in logged:
-            columns |= {f"{robot}.seen_{axis}_m": logged["published"][3 * i + a, at] for a, axis in enumerate("xyz")}
+        if (published := logged.get("announced", logged.get("published"))) is not None:
+            columns |= {f"{robot}.seen_{axis}_m": published[3 * i + a, at] for a, axis in enumerate("xyz")}
     for i, ugv in enumerate(ugvs):
         columns |= {f"{ugv}.ref_{axis}_m": reference[3 * i + a] for a, axis in enumerate("xyz")}
         columns |= {f"{ugv}.ref_v{axis}_m_s": reference[3 * (len(ugvs) + i) + a] for a, axis in enumerate("xyz")}
@@ -160,6 +160,12 @@ def samples(
             columns |= {f"{ugv}.uav_saw_{axis}_m": logged["seen_by_uav"][3 * i + a, at] for a, axis in enumerate("xyz")}
         if "command_share" in logged:
             columns[f"{ugv}.command_share"] = logged["command_share"][i, at + 1]
+        if "heard_s" in logged:
+            columns |= {
+                f"{ugv}.heard_{other}_s": logged["heard_s"][len(ugvs) * i + k, at]
+                for k, other in enumerate(ugvs)
+                if k != i
+            }
     return pd.DataFrame(columns)
 
 

@@ -29,7 +29,10 @@ chose, which is held until the next sample.
     <ugv>.ref_x_m .ref_y_m .ref_z_m           preset trajectory rho_rd(t)
     <ugv>.ref_vx_m_s .ref_vy_m_s .ref_vz_m_s  its velocity
     <ugv>.executing                           number of the proposal executed from this sample on, -1 without one
-    <robot>.seen_x_m .seen_y_m .seen_z_m      only with `sensing`: its measured position, which robots act on
+    <robot>.seen_x_m .seen_y_m .seen_z_m      only with `sensing` or `channel.ugvs.delay_s`: its published position,
+                                              which robots act on
+    <ugv>.heard_<other>_s                     only with `channel.ugvs.loss`: the sample at which another UGV published
+                                              the last position that this one has of it
     <ugv>.uav_saw_x_m .uav_saw_y_m .uav_saw_z_m  only with `sensing`: where the UAV saw it, to plan with
     <ugv>.command_share                       only with unicycles: the share that was left of the law's command
     <robot>.drift_m_s .cover_m                only of users' plants, in the period that begins here: by how much
@@ -300,7 +303,7 @@ class Trace:
         Raises:
             TraceError: if a row of `seen` is not at the time of a control sample.
         """
-        if self.scenario.sensing and of in self.robots:
+        if self.scenario.publishes and of in self.robots:
             return self._vectors(self.sampled, of, "seen_", "m")
         places = self.position(of)[self.sample_rows]
         mine = self.seen[(self.seen["by"] == by) & (self.seen["of"] == of)]

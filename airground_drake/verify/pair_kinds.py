@@ -93,7 +93,7 @@ def _kinds(scenario: Scenario) -> Iterator[PairKind]:
     """The extreme pairs of each kind in `SHARES`: the hypotheses hold for all pairs if they hold for these."""
     # Kept are pairs that no other pair exceeds in both distance and speed, and the nearest pair.
     control, robots = scenario.control, scenario.robots
-    bounds = {name: bounds_of(robot, control.period_s, scenario.position_error_m) for name, robot in robots.items()}
+    bounds = {name: bounds_of(robot, control.period_s, scenario.seen(name)) for name, robot in robots.items()}
     pairs: dict[str, set[tuple[Fraction, Fraction]]] = {kind: set() for kind in SHARES}
     asked = {(pair.kind, bounds[pair.first], bounds.get(pair.second, AT_REST), *pair[3:]) for pair in apart(scenario)}
     for kind, own, other, required, radii in asked:

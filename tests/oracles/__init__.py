@@ -13,6 +13,7 @@ from oracles.communication import wrong_messages
 from oracles.decisions import wrong_decisions
 from oracles.fault import Fault
 from oracles.inputs import wrong_inputs
+from oracles.positions import wrong_positions
 from oracles.predictions import wrong_predictions
 from oracles.progress import wrong_answers
 from oracles.protocol import wrong_executions
@@ -24,6 +25,7 @@ ORACLES: dict[str, Callable[[Trace], list[Fault]]] = {
     "communication": wrong_messages,
     "protocol": wrong_executions,
     "channel": wrong_carriage,
+    "positions": wrong_positions,
     "inputs": wrong_inputs,
     "decisions": wrong_decisions,
 }

@@ -25,6 +25,7 @@ from oracles.control_law import (
     tracking,
 )
 from oracles.fault import Fault
+from oracles.positions import stands
 from oracles.protocol import executed_at
 from oracles.turning import able, edges, numbers_of
 
@@ -70,7 +71,7 @@ def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
     heading = trace.column(f"{ugv}.heading_rad")[samples] if numbers[0] else np.zeros(len(samples))
     given = given.also(*edges(heading, numbers))
     limit = np.full(len(samples), scenario.ugvs[ugv].max_speed_m_s)
-    executed = executed_at(trace, ugv)
+    executed, standing = executed_at(trace, ugv), stands(trace, ugv)
     rows = np.flatnonzero([sent is not None for sent in executed])
     now = [(sent, float(t[k])) for k, sent in enumerate(executed) if sent is not None]
     wanted = np.array([place(*each) for each in now]).reshape(-1, 3)
@@ -86,6 +87,7 @@ def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
         command = commanded(trace, position, own, given, rows, wish, limit)
         if numbers[0]:
             command = able(command, heading, numbers, scenario.control.period_s)
+        command[standing] = 0.0
         away = np.linalg.norm(recorded - command, axis=1)
         closer = ~(away >= found.away)
         found.command[closer], found.away[closer] = command[closer], away[closer]

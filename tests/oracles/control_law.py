@@ -13,7 +13,10 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.runs.control_law import ON_TOP, PLANE, inequalities_of
+from airground_drake.verify.runs.control_law import Inequalities as OfRun
+from airground_drake.verify.runs.pairs import parts_of
 from airground_drake.verify.runs.proposals import ProposalRecord
+from oracles.positions import unheard
 from oracles.projection import closest, least_violation, shortened
 
 MARGIN_M_S = 1e-12
@@ -46,12 +49,19 @@ class Inequalities(NamedTuple):
 
 def as_seen(trace: Trace, robot: str) -> Inequalities:
     """The inequalities of what a robot saw at the control samples, side by side in the order of its controller."""
-    given, count = inequalities_of(trace, robot, as_seen=True), len(trace.sample_rows)
+    given, count = _heard(trace, robot), len(trace.sample_rows)
     k = np.arange(len(given.sample)) - np.searchsorted(given.sample, given.sample)
     most = int(k.max(initial=-1)) + 1
     normal, bound, retreat = np.zeros((count, most, 3)), np.full((count, most), -np.inf), np.zeros((count, most))
     normal[given.sample, k], bound[given.sample, k], retreat[given.sample, k] = given.normal, given.bound, given.retreat
     return Inequalities(normal, bound, retreat if retreat.any() else None)
+
+
+def _heard(trace: Trace, robot: str) -> OfRun:
+    """The inequalities of a robot, without those beside robots whose messages it lacks."""
+    given, parts = inequalities_of(trace, robot, as_seen=True), len(parts_of(trace).owner)
+    lacks = np.pad(unheard(trace, robot), ((0, 0), (parts, 0)))[given.sample, given.column]
+    return OfRun(*(array[~lacks] for array in given))
 
 
 def retreating(below: Array, given: Inequalities, limit: Array | float, *, planar: bool) -> Array:

@@ -33,6 +33,7 @@ class Body:
         appears_s: time from which on an obstacle is there, s.
         disappears_s: time from which on it is not there any more, s.
         error_m: of a robot, bound of the error of its measured position, m.
+        may_stand: whether a robot may stand because it does not know where another one is.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Body:
     appears_s: float = 0.0
     disappears_s: float = np.inf
     error_m: float = 0.0
+    may_stand: bool = False
 
     def __post_init__(self) -> None:
         """Check the kind and the speed limit."""
@@ -64,7 +66,7 @@ class Body:
         """How far a robot may be from where the law steers it."""
         if not (self.plant and self.kind in ROBOTS):
             return AT_REST
-        return self.plant.bounds(self.max_speed_m_s)._replace(error_m=self.error_m)
+        return self.plant.bounds(self.max_speed_m_s)._replace(error_m=self.error_m, may_stand=self.may_stand)
 
 
 class Neighbours(NamedTuple):

@@ -19,7 +19,7 @@ Where the law acts on measured positions, off by e_i and e_j at most, e = e_i + 
 
 if e (1 - A' h) <= A' h times what the points then keep at the samples, d_law - e - drifts / A'. Beside a set at rest
 A' = A. Of two robots one may have to stand, because measured inequalities contradict one another: then the pair meets
-the law with A' = A / 2 (theorem Budget.one_stands).
+the law with A' = A / 2 (theorem Budget.one_stands). So it is where one of them may lack the other's position.
 """
 
 import math
@@ -46,6 +46,7 @@ class Bounds(NamedTuple):
     error_m: float = (
         0.0  # of the measured position of the steered point; both of a pair use the same measured positions
     )
+    may_stand: bool = False  # whether the robot may stand because it does not know where another one is
 
     @property
     def exact(self) -> bool:
@@ -98,7 +99,8 @@ def law_distance(
 
 def part_of_gain(one: Bounds, other: Bounds = AT_REST) -> float:
     """A' / A of a pair: a half where one of two robots may have to stand, else 1."""
-    return 0.5 if one.error_m + other.error_m and other != AT_REST else 1.0
+    stands = one.error_m + other.error_m > 0.0 or one.may_stand or other.may_stand
+    return 0.5 if stands and other != AT_REST else 1.0
 
 
 def least_gain(distance: float, one: Bounds, other: Bounds = AT_REST) -> float:

@@ -73,6 +73,8 @@ class Batch:
         (flown_by, uav), *more = given.aerial.items()
         if given.channel is not None and method.intervenes:
             raise LeftToDrakeError("a channel")
+        if given.ugv_links is not None:
+            raise LeftToDrakeError("positions of UGVs over links")
         if more:
             raise LeftToDrakeError("several UAVs")
         if uav.lost_at_s:

@@ -127,11 +127,15 @@ class UgvController(_Controller):
         proposals = accepted_proposals(self._proposals.Eval(context), self._answers.Eval(context))
         headings = None if self._headings is None else self._headings.Eval(context)
         law = self._in_force(context)
-        velocity = self.velocity(context.get_time(), positions, reference, rate, proposals, headings, law)
+        velocity = self._commanded(context, context.get_time(), positions, reference, rate, proposals, headings, law)
         if headings is not None:
             discrete.set_value(2, self.shorten(velocity, headings))
         discrete.set_value(0, velocity.ravel())
         discrete.set_value(1, [NOTHING if proposal is None else float(proposal.number) for proposal in proposals])
+
+    def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
+        """`velocity`, with what the ports say beyond its arguments."""
+        return self.velocity(t, positions, *about)
 
     def shorten(self, velocity: Array, headings: Array) -> Array:
         """Shorten commands (n, 3), m/s, in place, to what unicycles with headings (n,), rad, can do."""
@@ -154,13 +158,13 @@ class UgvController(_Controller):
         # t: s; positions: (M, 3), m; reference: (n, 3), m; rate: (n, 3), m/s; headings: (n,), rad
         # law: default: the one with the default gains.
         law = self.law if law is None else law
-        asked = [None if p is None else _asked(p, t) for p in accepted]
+        asked = [None if p is None else asked_at(p, t) for p in accepted]
         steering = self._world.steering
         steered = None if steering is None or headings is None else (headings, steering)
         return law.velocity(positions, self._world.at(self._near, t), reference, rate, asked, steered)
 
 
-def _asked(proposal: Proposal, t: float) -> AcceptedMotion:
+def asked_at(proposal: Proposal, t: float) -> AcceptedMotion:
     """What an accepted proposal asks for at time t, s."""
     motion = proposal.motion
     wanted, rate = moving.at(motion.times, motion.positions, motion.slopes, t)

@@ -17,7 +17,8 @@ from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 ROUNDED_M = 1e-12  # by so much rounding may make a distance of the law too small, m
 BASIC = ("Budget.at_samples", "Budget.budget_always")
 # Those about a robot beside an obstacle that may move; a plant adds its own.
-OF_ERRORS = ("Budget.measured_start", "Budget.one_stands", "Budget.smaller_gain", "Mixed.entry_keeps")
+OF_STANDING = ("Budget.one_stands", "Budget.smaller_gain")
+OF_ERRORS = ("Budget.measured_start", *OF_STANDING, "Mixed.entry_keeps")
 BESIDE_MOVING = ("Passive.own_doing", "Passive.kept")
 
 
@@ -31,7 +32,7 @@ class SafeBudget(TheoremClaim):
         "from a start at which they have it. Beside an obstacle that appears later, that is where a body that lags or "
         "gets its commands late, and its way under commands already given, are clear (SAFE-HYP). So do the bodies of "
         "robots that act on measured positions with bounded errors, as each inequality is met as measured, or both of "
-        "a pair stand. "
+        "a pair stand, and those of UGVs that stand where they lack another one's message. "
         "Beside an obstacle that may move, the bodies keep in the same way what SAFE-OWN states. For each kind of pair "
         "d_law is at least what the theorems ask for."
     )
@@ -81,6 +82,7 @@ class SafeBudget(TheoremClaim):
                 for name, robot in robots.items()
             },
             **({"position_error_m": scenario.position_error_m} if scenario.position_error_m else {}),
+            **({"may_stand": stands} if (stands := [n for n in robots if scenario.seen(n)["may_stand"]]) else {}),
             "pairs": [
                 {
                     "first": pair.first, "second": pair.second, "kind": pair.kind, "law_m": pair.law_m,
@@ -97,7 +99,7 @@ class SafeBudget(TheoremClaim):
         named = [*BASIC, *(name for plant in plants for name in plant.theorems)]
         if moving:
             named += [*BESIDE_MOVING, *(name for plant in plants for name in plant.passive_theorems)]
-        named += OF_ERRORS if "position_error_m" in inputs else ()
+        named += OF_ERRORS if "position_error_m" in inputs else OF_STANDING if "may_stand" in inputs else ()
         claim = SafeBudget()
         claim.theorems = (*dict.fromkeys(named),)
         return TheoremClaim.check(claim, inputs)
@@ -115,8 +117,10 @@ class SafeBudget(TheoremClaim):
     def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
         error_m = inputs.get("position_error_m", 0.0)
         share = float(decimal(inputs["avoidance_gain_1_s"]) * decimal(inputs["period_s"]))
+        stands = inputs.get("may_stand", ())
         bounds = {
-            name: plant.bounds(speed)._replace(error_m=error_m) for name, (plant, speed) in _plants(inputs).items()
+            name: plant.bounds(speed)._replace(error_m=error_m, may_stand=name in stands)
+            for name, (plant, speed) in _plants(inputs).items()
         }
         for pair in inputs["pairs"]:
             both = (bounds[pair["first"]], bounds.get(pair["second"], AT_REST))

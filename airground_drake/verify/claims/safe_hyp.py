@@ -7,8 +7,8 @@ follows. The parameters of the controllers are compared with the scenario (`dema
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
-from functools import cache
-from itertools import groupby
+from functools import cache, partial
+from itertools import groupby, permutations
 from math import inf, isfinite, nextafter
 from typing import Any, NamedTuple
 
@@ -35,6 +35,7 @@ from airground_drake.verify.runs.pairs import (
     cores_of,
     distances_when_there,
     is_planar,
+    pair_of,
     pairs_of,
     parts_of,
     snapshot,
@@ -53,6 +54,8 @@ DECLARED = "declared speed"  # the hypothesis that an obstacle moved no faster t
 # The hypotheses that a pair begins apart: the points that the law steers, and the bodies that lag or come late.
 START, BODIES = "safe start", "safe start of the bodies"
 MEASURED = "error of the measured position"  # the hypothesis that robots are no farther from where they are seen
+ANNOUNCED = "announced position"  # the hypothesis that robots are where they said that they would be
+UNHEARD = "standing without a message"  # the hypothesis that UGVs stand who do not know where a near one is
 BUILT = "controller parameters"  # the hypothesis that the controllers were built with what the scenario demands
 
 
@@ -126,7 +129,8 @@ class SafeHyp(TraceClaim):
         "may move the passive law held, and it moved no faster than declared: so d was kept in every period that "
         "began at d + V h or more. The controllers were built with what the scenario says; one of the user's own is "
         "judged by its steps alone. Where robots act on measured positions, the inequalities are those of the pair as "
-        "measured, errors were within their bound, and d is that of the true bodies."
+        "measured, errors were within their bound, and d is that of the true bodies. Where messages between UGVs may "
+        "be lost, a UGV stood unless it knew that those whose message it lacked were far."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -149,7 +153,8 @@ class SafeHyp(TraceClaim):
         "them, and keeps what all of them keep. The distances promised are listed less the radii. The parameters of "
         "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
         "apart count as one instant. With errors of positions D and n are those of measured ones and steps are true: a "
-        "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands."
+        "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands. "
+        "The same holds for two robots of which one may lack the other's message."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
@@ -175,7 +180,7 @@ class SafeHyp(TraceClaim):
     def check(self, trace: Trace) -> Finding:
         """Evaluate all hypotheses; the first violation in time is the counterexample."""
         kept = sorted(guarantees(trace), key=lambda promised: promised.margin_m)
-        others = [*_static(trace), *_sampled(trace), *_of_plants(trace), *_beside_moving(trace)]
+        others = [*_static(trace), *_sampled(trace), *_unheard(trace), *_of_plants(trace), *_beside_moving(trace)]
         different = list(differences(trace))
         broken = [h.at(int(k)) for h in [*others, *_avoidance(trace, kept)] for k in h.broken()[:1]]
         broken += [{"hypothesis": BUILT, "t_s": float(trace.t[0]), **difference} for difference in different[:1]]
@@ -296,8 +301,9 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         both = bounds[pair.first], bounds.get(pair.second, AT_REST)
         gain = of_law * Fraction(part_of_gain(*both))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
+        seen = partial(_seen, trace, pair, there) if pair.error_m or gain < of_law else None
         missed = [
-            shortfalls(first, place, pair.law_m, *asked, core, planar=planar, seen=_seen(trace, pair, place, there))
+            shortfalls(first, place, pair.law_m, *asked, core, planar=planar, seen=seen(place) if seen else None)
             for place, core in beside
         ]
         begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.law_m, core, planar=planar) for place, core in beside]
@@ -319,10 +325,8 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
 
 
-def _seen(trace: Trace, pair: Pair, place: Array, there: slice) -> tuple[Array, Array] | None:
-    """Measured places of a pair at the samples, (K, 3), m, each, if robots act on these; None if not."""
-    if not pair.error_m:
-        return None
+def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> tuple[Array, Array]:
+    """Places of a pair that robots act on at the samples, (K, 3), m, each."""
     samples = slice(there.start, there.stop - 1)
     own = trace.as_seen(pair.first, pair.first)[samples]
     other = trace.as_seen(pair.first, pair.second)[samples] if pair.second in trace.robots else None
@@ -448,11 +452,30 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
             yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
         spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
-        if trace.scenario.sensing:
+        if trace.scenario.position_error_m or (trace.scenario.sensing and not trace.scenario.announces):
             left = error_margins(trace, robot)
             yield _Hypothesis(MEASURED, "m", trace.sampled("t_s"), left, 0.0, about)
+        elif trace.scenario.announces:
+            off = np.linalg.norm(trace.as_seen(robot, robot) - place[samples], axis=1)
+            yield _Hypothesis(ANNOUNCED, "m", trace.sampled("t_s"), 0.0 - off, DISTANCE_TOLERANCE_M, about)
         if robot in trace.ugvs:
             yield _Hypothesis("planar motion", "m", t, 0.0 - np.abs(place[:, 2] - place[0, 2]), 0.0, about)
+
+
+def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
+    """UGVs stand where they lack a message of another one that is not surely far."""
+    if trace.scenario.ugv_links is None or not trace.scenario.ugv_links.loss:
+        return
+    t, period, bounds = trace.sampled("t_s"), trace.scenario.control.period_s, bounds_of(trace)
+    speed = {ugv: bounds[ugv].speed_m_s + bounds[ugv].drift_m_s for ugv in trace.ugvs}
+    for first, second in permutations(trace.ugvs, 2):
+        heard = trace.sampled(f"{first}.heard_{second}_s")
+        known = trace.as_seen(first, second)[np.searchsorted(t, heard - TIME_TOLERANCE_S).clip(0, len(t) - 1)]
+        apart = np.linalg.norm(trace.as_seen(first, first) - known, axis=1) - speed[second] * (t - heard)
+        spare = apart - pair_of(trace, first, second).law_m - (speed[first] + speed[second]) * period
+        driven = period * np.linalg.norm(trace.chosen(first), axis=1)
+        margin = np.where(heard < t - TIME_TOLERANCE_S, np.minimum(np.maximum(spare, 0.0 - driven), 0.0), 0.0)
+        yield _Hypothesis(UNHEARD, "m", t, margin, DISTANCE_TOLERANCE_M, {"first": first, "second": second})
 
 
 def error_margins(trace: Trace, robot: str) -> Array:

@@ -469,8 +469,11 @@ def off_steered_m(trace: Trace, robot: str) -> Fraction:
 def law_m(trace: Trace, distance_m: Fraction, first: str, second: str) -> Fraction:
     """The distance that the law keeps between two steered points, or one and a set at rest, m."""
     robots, control = trace.scenario.robots, trace.scenario.control
-    about = control.period_s, trace.scenario.position_error_m
-    both = [bounds_of(robots[name], *about) for name in (first, second) if name in robots]
+    both = [
+        bounds_of(robots[name], control.period_s, trace.scenario.seen(name))
+        for name in (first, second)
+        if name in robots
+    ]
     if all(plant.exact for plant in both):
         return distance_m
     return Fraction(float(law_distance(float(distance_m), *both, gain=control.avoidance_gain_1_s)))

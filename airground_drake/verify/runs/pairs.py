@@ -147,8 +147,10 @@ def pairs_by(
 def bounds_of(trace: Trace) -> dict[str, Bounds]:
     """How far the bodies of the robots may be from where the law steers them, by name."""
     robots = trace.scenario.robots
-    error_m = trace.scenario.position_error_m
-    return {name: trace.plant(name).bounds(robots[name].max_speed_m_s)._replace(error_m=error_m) for name in robots}
+    return {
+        name: trace.plant(name).bounds(robots[name].max_speed_m_s)._replace(**trace.scenario.seen(name))
+        for name in robots
+    }
 
 
 class Parts(NamedTuple):

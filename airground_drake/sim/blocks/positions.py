@@ -1,0 +1,189 @@
+"""Positions between UGVs over links that are late and lose messages: what is announced, what is heard, who stands.
+
+A robot publishes at a control sample where it will be at the next one: then messages have a period to arrive. Without
+this sample's message of another UGV a UGV stands, unless that one is surely far; then it leaves it out of its law.
+"""
+
+import random
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, System
+
+from airground_drake.base.arrays import Array
+from airground_drake.model.bodies.motion import SAME_S
+from airground_drake.model.bodies.world import Neighbours, World
+from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.scenario.schema import Scenario
+from airground_drake.sim.blocks.controllers import UgvController, asked_at
+from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.signals import declare_bodies
+from airground_drake.uav.policy import Proposal
+
+# fields of `Neighbours` with a row per robot
+OF_ROBOTS = ("members", "others", "distance", "share", "mobility", "max_speed")
+
+
+@lru_cache(maxsize=4)
+def lost(seed: int, loss: float, count: int, sample: int) -> npt.NDArray[np.bool_]:
+    """Which messages of a control sample are lost, (count, count), by receiver and sender: nothing else counts."""
+    lot = random.Random(f"{seed}/ugvs/{sample}")
+    drawn = np.array([lot.random() for _ in range(count * count)]).reshape(count, count)
+    return np.asarray((drawn < loss) & ~np.eye(count, dtype=np.bool_) & (sample > 0))  # starts are known
+
+
+class Announcements(LeafSystem):
+    """Where UGVs said a control period ago that they would be: exact, if they move as they are told.
+
+    Ports (n UGVs, M bodies that move, world frame):
+        in  `bodies` (3M) m; `ugv_command` (3n) m/s, held.
+        out `announced` (3M) m; of bodies that are no UGVs, and before the second sample, where they are.
+    State: discrete, the places at the last sample, (3M), and 1 once there was one.
+    Rate: one update per control period, from t = 0.
+    """
+
+    def __init__(self, world: World, period: float) -> None:
+        super().__init__()
+        self._ugvs, self._period, size = world.select("ugv"), period, 3 * len(world.moving)
+        self._bodies = declare_bodies(self, world)
+        self._command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
+        self.DeclareDiscreteState(size + 1)
+        self.DeclareVectorOutputPort("announced", size, weakly(self._calc))
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, weakly(self._update))
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        places = self._bodies.Eval(context).reshape(-1, 3).copy()
+        *last, begun = context.get_discrete_state(0).value()
+        if begun:
+            led = self._period * self._command.Eval(context).reshape(-1, 3)
+            places[self._ugvs] = np.reshape(last, (-1, 3))[self._ugvs] + led
+        output.SetFromVector(places.ravel())
+
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
+        discrete.set_value(0, np.append(self._bodies.Eval(context), 1.0))
+
+
+class Hearing(LeafSystem):
+    """What UGVs have heard of each other's positions.
+
+    Ports (n UGVs, M bodies that move, world frame):
+        in  `bodies` (3M) m: what is published.
+        out `heard_s` (n n), by receiver and sender: the control sample, s, of the last position that arrived;
+            `last_places` (3 n n) m, that position.
+    State: discrete, the same.
+    Rate: one update per control period, from t = 0.
+    """
+
+    def __init__(self, world: World, seed: int, loss: float, period: float) -> None:
+        super().__init__()
+        self._ugvs, self._seed, self._loss, self._period = world.select("ugv"), seed, loss, period
+        self._bodies = declare_bodies(self, world)
+        n = len(world.names("ugv"))
+        self.DeclareDiscreteState(np.zeros(n * n))
+        self.DeclareDiscreteState(np.tile(world.starts[self._ugvs], (n, 1)).ravel())
+        self.DeclareVectorOutputPort("heard_s", n * n, weakly(self._calc_heard))
+        self.DeclareVectorOutputPort("last_places", 3 * n * n, weakly(self._calc_places))
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, weakly(self._update))
+
+    def _now(self, context: Context) -> tuple[Array, Array]:
+        """Times, (n, n), s, and places, (n, n, 3), m, with the messages of this instant."""
+        published = self._bodies.Eval(context).reshape(-1, 3)[self._ugvs]
+        n, t = len(published), context.get_time()
+        heard, places = (context.get_discrete_state(k).value().copy() for k in (0, 1))
+        heard, places, sample = heard.reshape(n, n), places.reshape(n, n, 3), round(t / self._period)
+        if abs(t - sample * self._period) <= SAME_S:
+            arrived = ~lost(self._seed, self._loss, n, sample)
+            heard[arrived] = t
+            places[arrived] = np.broadcast_to(published, (n, n, 3))[arrived]
+        return heard, places
+
+    def _calc_heard(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._now(context)[0].ravel())
+
+    def _calc_places(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._now(context)[1].ravel())
+
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
+        for k, now in enumerate(self._now(context)):
+            discrete.set_value(k, now.ravel())
+
+
+class WaryUgvController(UgvController):
+    """A `UgvController` with the further input ports `heard_s` and `last_places`, see `Hearing`."""
+
+    def __init__(self, world: World, law: UgvLaw) -> None:
+        super().__init__(world, law)
+        n = len(world.names("ugv"))
+        self._heard = self.DeclareVectorInputPort("heard_s", n * n)
+        self._last_places = self.DeclareVectorInputPort("last_places", 3 * n * n)
+        # commands of UGVs and what their plants may miss of them, m/s
+        speed = np.array([body.max_speed_m_s + body.bounds.drift_m_s for body in world.moving[:n]])
+        self._speed, self._far = speed, _distances(self._near, n) + (speed[:, None] + speed) * law.avoidance.period
+
+    def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
+        """The law's commands; UGVs that lack a message stand, or leave out whom they know to be far."""
+        velocity = super()._commanded(context, t, positions, *about)
+        n = len(velocity)
+        heard = self._heard.Eval(context).reshape(n, n)
+        last = self._last_places.Eval(context).reshape(n, n, 3)
+        unheard = heard < t - SAME_S
+        apart = np.linalg.norm(positions[self._near.members][:, None] - last, axis=2)
+        far = apart - self._speed * (t - heard) > self._far
+        velocity[(unheard & ~far).any(axis=1)] = 0.0
+        for i in np.flatnonzero(unheard.any(axis=1) & (far | ~unheard).all(axis=1)).tolist():
+            velocity[i] = self._without(i, unheard[i], t, positions, *about)
+        return velocity
+
+    def _without(
+        self, i: int, left_out: npt.NDArray[np.bool_], t: float, positions: Array, reference: Array, rate: Array,
+        accepted: Sequence[Proposal | None], headings: Array | None, law: UgvLaw,
+    ) -> Array:  # fmt: skip
+        """The command of UGV i, (3,), m/s, by the law as if some UGVs were beyond its sensing range."""
+        known, near, one = positions.copy(), self._world.at(self._near, t), slice(i, i + 1)
+        known[near.members[left_out]] = known[near.members[i]] + [2.0 * law.avoidance.sensing_range, 0.0, 0.0]
+        near = near._replace(**{name: getattr(near, name)[one] for name in OF_ROBOTS})
+        steering, motion = self._world.steering, accepted[i]
+        steered = None if steering is None or headings is None else (headings[one], steering[one])
+        asked = [None if motion is None else asked_at(motion, t)]
+        velocity: Array = law.velocity(known, near, reference[one], rate[one], asked, steered)[0]
+        return velocity
+
+
+def _distances(near: Neighbours, n: int) -> Array:
+    """The distances that the law keeps between n UGVs, (n, n), m."""
+    others, still = near.carrier[near.others], near.distance.shape[1] - near.others.shape[1]
+    kept = np.zeros((n, n))
+    for i in range(n):
+        of_ugvs = others[i] < n
+        kept[i, others[i, of_ugvs]] = near.distance[i, still:][of_ugvs]
+    return kept
+
+
+class Between(NamedTuple):
+    """What stands between the positions of robots and the controller of the UGVs."""
+
+    controller: UgvController
+    parts: Mapping[str, LeafSystem]  # of the diagram, by name
+    renamed: Mapping[System, Mapping[str, str]]  # what feeds their port `bodies`
+    published: str  # name of the output port with the positions that robots act on
+
+
+def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
+    """Positions as they are or as they are measured, and over the links between UGVs if there are any."""
+    published, link, period = (
+        "published" if scenario.sensing else "bodies",
+        scenario.ugv_links,
+        scenario.control.period_s,
+    )
+    parts, renamed = dict[str, LeafSystem](), dict[System, Mapping[str, str]]()
+    if link and link.delay_s:
+        parts["announcements"] = Announcements(world, period)
+        renamed[parts["announcements"]], published = {"bodies": published}, "announced"
+    if not (scenario.channel and link and link.loss):
+        return Between(UgvController(world, law), parts, renamed, published)
+    parts["hearing"] = Hearing(world, scenario.channel.seed, link.loss, period)
+    renamed[parts["hearing"]] = {"bodies": published}
+    return Between(WaryUgvController(world, law), parts, renamed, published)
