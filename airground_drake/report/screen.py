@@ -331,7 +331,8 @@ def _real(report: Report) -> str:
     own = [plant for claim in report.about(rules.CONDITIONS) for plant in claim.evidence.get("own_plants", ())]
     if not own:
         error_m = report.scenario.resolved.position_error_m
-        sensing = f"errors of positions are at most {error_m:g} m" if error_m else "sensing is perfect"
+        perfect = "sensing is perfect" if report.scenario.resolved.ugv_links is None else "positions heard are exact"
+        sensing = f"errors of positions are at most {error_m:g} m" if error_m else perfect
         return f"other starts or real robots end so, too: arrival is only seen, and {sensing} here"
     most = max(own, key=lambda plant: float(plant["cover_m"]))
     return (

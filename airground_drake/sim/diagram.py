@@ -394,7 +394,8 @@ def make_monitor(
 
     Raises:
         ScenarioError, UnknownNameError, PluginError: as `build_diagram`; also if the UGVs have a controller of the
-            user's, whose law is not known, or act on measured positions, which a monitor does not see.
+            user's, whose law is not known, or act on measured positions or on messages about positions, which a
+            monitor does not see.
     """
     scenario = validated(scenario)
     if scenario.ugv_controller is not None:
@@ -403,6 +404,9 @@ def make_monitor(
     if scenario.sensing is not None:
         told = f"sensing of scenario {scenario.name!r} has errors, and a monitor sees true positions"
         raise PluginError(f"{told}; allowed: a scenario without sensing")
+    if scenario.ugv_links is not None:
+        told = f"channel.ugvs of scenario {scenario.name!r} says what UGVs know, and a monitor sees true positions"
+        raise PluginError(f"{told}; allowed: a scenario without it")
     chosen, composition = _chosen(scenario, method, composition)
     world = make_world(scenario)
     ugvs = UgvController(world, components.make_law(scenario, chosen, composition))

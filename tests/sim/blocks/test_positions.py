@@ -9,13 +9,14 @@ import pytest
 from oracles import faults_of
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import ScenarioError
+from airground_drake.base.errors import PluginError, ScenarioError
 from airground_drake.check import safety
 from airground_drake.check.run import Run
 from airground_drake.model.plants.budget import Bounds, law_distance, part_of_gain
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.blocks.positions import WaryUgvController, lost
+from airground_drake.sim.diagram import make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
@@ -233,3 +234,5 @@ def test_one_of_a_pair_that_may_stand_costs_half_the_gain() -> None:
 def test_without_the_key_nothing_is_written_of_it_and_the_loop_leaves_it_to_drake() -> None:
     assert simulate(team(0, {"loss": 0.5}), "a", engine="batch").samples.equals(run(0, 0.5).samples)
     assert "ugvs" not in resolved(load("noisy_link"))["channel"]
+    with pytest.raises(PluginError, match="says what UGVs know, and a monitor sees true positions"):
+        make_monitor(team(0, {"loss": 0.5}))
