@@ -167,15 +167,19 @@ class Planner:
         # Without a proposal in force no answer is read. Then a negotiation changes only when its rest is over, or when
         # neither its UGV nor its cause is triggered any more. A proposal stays while nobody answers, or with an
         # acceptance that was read. Answers over a channel are not given: what is read there need not be the newest.
+        # Without policies nobody is asked, and nothing else is recorded.
+        if not self.database.policies:
+            return math.inf
         called = {name for name, own in zip(self.ugvs, self._own(intervening), strict=True) if own}
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         until = math.inf
         for i, (name, talk) in enumerate(zip(self.ugvs, memory.talks, strict=True)):
             proposal = talk.proposal
             if proposal is not None:
-                answer = REFUSE if answers is None else answer_to(proposal, answers, i)
-                unread = answer != SILENT and (reports[i].number > newest or reports[i].seen)
-                if answer in (REFUSE, DONE) or unread or self._comes_and_goes:
+                if answers is None or self._comes_and_goes:
+                    return -math.inf
+                answer = answer_to(proposal, answers, i)
+                if answer in (REFUSE, DONE) or (answer == ACCEPT and (reports[i].number > newest or reports[i].seen)):
                     return -math.inf
                 until = min(until, proposal.motion.end)
             party = proposal.party if proposal else ()
