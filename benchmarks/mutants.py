@@ -1,6 +1,6 @@
 """Every mutant, and the test that notices it: `python benchmarks/mutants.py [--only WORD]`.
 
-A mutant is one edit of the package, made in a temporary copy. `benchmarks/mutation/chosen.py` lists edits that matter,
+A mutant is one edit of the package, made in a temporary copy. `benchmarks/mutation/chosen.txt` lists edits that matter,
 each with the tests that must notice it. These run on the copy until one fails; that test must pass on the package as it
 is. Prints a line for each mutant. Exit code 1 if one survives.
 """

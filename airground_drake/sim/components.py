@@ -114,6 +114,7 @@ def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:
         ),
         sender=Sender(uav, first=[*scenario.aerial].index(uav), step=len(scenario.aerial)),
         lead=scenario.channel.delay_s if scenario.channel else 0.0,
+        retry=repeats_after(scenario),
         charge=tuple(ugv in scenario.in_charge(uav) for ugv in scenario.ugvs),
         lost_at=scenario.aerial[uav].lost_at_s or np.inf,
     )

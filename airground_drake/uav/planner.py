@@ -33,6 +33,9 @@ from airground_drake.uav.messages import (
 from airground_drake.uav.policy import Answered, MovingObstacle, Observation, Proposal, Teammate
 
 BEHIND_S = 1.0  # a motion has left a UGV behind if from its end the UGV is farther than it could go in this time
+# A motion that begins more than this before its UGV can read of it is planned anew, not repeated, s. A UGV that takes
+# it up late heads for where it is then, through what it leads round; within this time it has not led far.
+LATE_S = 0.5
 _WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
 
 
@@ -132,6 +135,7 @@ class Planner:
     trails: tuple[bool, ...] = ()
     sender: Sender = ONLY  # the UAV
     lead: float = 0.0  # time that a proposal is under way, s
+    retry: float = np.inf  # after so long, s, a proposal without an answer is repeated
     charge: tuple[bool, ...] = ()  # per UGV, whether the UAV is in charge of it; default: of all
     lost_at: float = np.inf  # from this time on the UAV neither sends nor hears anything, s
 
@@ -337,8 +341,21 @@ class Planner:
                 off = np.linalg.norm(positions[i] - proposal.motion.positions[-1]) if t >= proposal.motion.end else 0.0
                 behind = trails and bool(off > BEHIND_S * self.max_speed[i])
                 talk = replace(talk, proposal=None, too_fast=talk.too_fast + behind)
+            elif answer == SILENT and proposal is not None and self._is_late(proposal, name, t, positions[i]):
+                talk = replace(talk, proposal=None)
             after.append(talk)
         return after
+
+    def _is_late(self, proposal: Proposal, ugv: str, t: float, place: Array) -> bool:
+        """Whether a proposal without an answer would come too late if it was repeated: its UGV is at a place, m."""
+        # A part of a joint plan is never late: the other UGVs have theirs. A UGV that is nearer to where the motion is
+        # than to where it began has read the proposal, and its answer is late or lost.
+        began, motion = float(proposal.motion.times[0]), proposal.motion
+        if proposal.party or proposal.cause not in ("", ugv) or t < proposal.issued + self.retry - SAME_S:
+            return False
+        first, now = motion.sample(np.array([began, t]))
+        nearer = np.linalg.norm(place - first) < np.linalg.norm(place - now)
+        return bool(nearer) and t + self.lead > began + LATE_S + SAME_S
 
     def _team(
         self,

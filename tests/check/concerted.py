@@ -40,12 +40,14 @@ from check.forging import (
     judged,
     read_table,
     remembered,
+    remembering,
     trace,
     write,
     write_table,
 )
 
 from airground_drake.base.errors import AirgroundError
+from airground_drake.base.progress import SILENT
 from airground_drake.check import command as checker
 from airground_drake.check.line import AGREES, RECORDED
 from airground_drake.report import junit, proved, rebuild, simulated
@@ -77,6 +79,7 @@ def make(folder: Path) -> None:
 def made_again(*edits: Edit) -> Edit:
     """After the edits, verdicts, counts, events and pages are made again from the forged traces and scenario."""
 
+    @remembering()
     def edit(folder: Path) -> None:
         all_of(*edits)(folder)
         with edited_report(folder) as document:
@@ -269,6 +272,7 @@ FORGERIES: dict[str, tuple[str, Edit]] = {
 PROGRAMS = ("i", "ii", "iii")
 
 
+@remembering()
 def refused_by(folder: Path, programs: Sequence[str] = PROGRAMS) -> dict[str, str]:
     """Of each of these programs that refuses a report, the first line that says so."""
 
@@ -292,9 +296,9 @@ def refused_by(folder: Path, programs: Sequence[str] = PROGRAMS) -> dict[str, st
     return found
 
 
-def remembering(patch: pytest.MonkeyPatch) -> None:
+def simulating_once(patch: pytest.MonkeyPatch) -> None:
     """Simulate each scenario once: most forgeries leave it as it is."""
-    with_seeds = remembered(simulated.with_seeds)
+    with_seeds = remembered(partial(simulated.with_seeds, progress=SILENT))
     patch.setattr(simulated, "simulate_all", remembered(simulated.simulate_all))
     patch.setattr(simulated, "with_seeds", lambda scenario, made, seeds, _: with_seeds(scenario, made, seeds))
 
@@ -305,7 +309,7 @@ def main(folder: Path) -> None:
         make(folder)
     print("| forgery | (i) | (ii) | (iii) |\n| --- | --- | --- | --- |")
     with pytest.MonkeyPatch.context() as patch:
-        remembering(patch)
+        simulating_once(patch)
         for name, (due, edit) in FORGERIES.items():
             found = refused_by(forged(folder, edit))
             cells_of = " | ".join("x" if by in found else "" for by in PROGRAMS)

@@ -126,6 +126,16 @@ def mend(folder: Path) -> None:
         }
 
 
+@contextlib.contextmanager
+def remembering() -> Iterator[None]:
+    """The checker, and making a report again, remember what they have worked out of a run."""
+    with pytest.MonkeyPatch.context() as patch:
+        for (module, name), function in REMEMBERED.items():
+            patch.setattr(module, name, function)
+        yield
+
+
+@remembering()
 def attempt(report: Path, edit: Edit, *, mended: bool = True) -> tuple[int, str]:
     """Forge a copy of a report, beside it, and check it: the exit code, and a line for each check that fails.
 
@@ -189,7 +199,6 @@ REMEMBERED = {
     (document, "_run"): remembered(document._run),
     (drawing, "draw"): remembered(drawing.draw),
 }
-"""Parts of the checker, and of making a report again, that are patched in."""
 
 
 def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:

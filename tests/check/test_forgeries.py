@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from check.concerted import FORGERIES, PROGRAMS, make, refused_by, remembering
+from check.concerted import FORGERIES, PROGRAMS, make, refused_by, simulating_once
 from check.forgeries import HOSTILE, RULES, UNMENDED
 from check.forging import attempt, edited_report, edited_table, forged, mend, read_table, write, write_table
 from hypothesis import given
@@ -45,7 +45,7 @@ def with_third_party_code(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     folder = tmp_path_factory.mktemp("forged") / "whole"
     make(folder)
     with pytest.MonkeyPatch.context() as patch:
-        remembering(patch)
+        simulating_once(patch)
         yield folder
 
 

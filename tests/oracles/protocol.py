@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from airground_drake.base.arrays import Array
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.proposals import GATED_METHODS, ProposalRecord, proposals_of, row_at
-from oracles.channel import has_channel, heard, held
+from oracles.channel import has_channel, heard, held, retry_s
 from oracles.fault import Fault
 
 
@@ -194,7 +195,8 @@ def withdrawn_s(trace: Trace, sent: ProposalRecord, *, unless_replaced: bool = F
     - neither the UGV, nor its cause, nor any party of its joint plan is being intervened on;
     - the motion has run out;
     - another proposal is sent to the UGV (not counted with `unless_replaced`);
-    - the UAV has a refusal of it, or of another part of its joint plan.
+    - the UAV has a refusal of it, or of another part of its joint plan;
+    - over a channel, it has no answer, and it is too late to repeat it.
 
     Once the UAV is lost, a proposal is over when its motion has run out, and nobody says so.
     """
@@ -237,6 +239,34 @@ def _over(trace: Trace, sent: ProposalRecord, unless_replaced: bool = False) -> 
         if now >= lost_s(trace, sent) - TIME_TOLERANCE_S:
             if t[row] >= sent.times_s[-1]:
                 return now, False
-        elif not called[row] or ended or refused or replaced <= now + TIME_TOLERANCE_S:
+        elif not called[row] or ended or refused or replaced <= now + TIME_TOLERANCE_S or _missed(trace, sent, now):
             return now, refused
     return np.inf, False
+
+
+LATE_S = 0.5
+"""A motion that begins so long before its UGV can read of it is not proposed again."""
+
+
+def _missed(trace: Trace, sent: ProposalRecord, now: float) -> bool:
+    """Whether a proposal that stands alone is too late to be repeated: no answer, and its UGV is still at its start."""
+    channel = trace.scenario.channel
+    if (
+        channel is None
+        or sent.party
+        or sent.cause != sent.ugv
+        or now < sent.issued_s + retry_s(trace) - TIME_TOLERANCE_S
+    ):
+        return False
+    last = heard(trace, sent.ugv, now)
+    if now + channel.delay_s <= sent.times_s[0] + LATE_S + TIME_TOLERANCE_S or (last and last["about"] == sent.number):
+        return False
+    k = int(np.abs(trace.sampled("t_s") - now).argmin())
+    seen = trace.scenario.sensing is not None
+    place = [trace.sampled(f"{sent.ugv}.uav_saw_{a}_m")[k] for a in "xyz"] if seen else _place(trace, sent.ugv, now)
+    there = [np.interp(now, sent.times_s, axis) for axis in sent.positions_m.T]
+    return bool(np.linalg.norm(place - sent.positions_m[0]) < np.linalg.norm(np.subtract(place, there)))
+
+
+def _place(trace: Trace, ugv: str, now: float) -> Array:
+    return trace.position(ugv)[row_at(trace, now)]

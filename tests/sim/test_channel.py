@@ -139,7 +139,7 @@ def all_is_new(before: Any, arrived: Any, t: float) -> Any:
 repeated = channel.repeated
 MUTANTS: dict[str, tuple[Any, str, Any, str, Channel]] = {
     "the UAV does not repeat": (channel, "repeated", never, "not repeated", Channel(loss=0.5)),
-    "it repeats at once": (channel, "repeated", lambda box, heard, t, _: repeated(box, heard, t, 0.05),
+    "it repeats at once": (channel, "repeated", lambda box, heard, t, _, left: repeated(box, heard, t, 0.05, left),
                            "repeated at another time", Channel(0.3)),
     "old proposals are taken up": (gatekeeper, "read", all_is_new, "a decision is missing",
                                    Channel(0.05, 1.5, 0.2, duplicate=0.9, seed=10)),

@@ -138,6 +138,34 @@ def test_another_plan_stays_in_force_when_a_joint_plan_is_refused() -> None:
     assert in_force(memory) == {"three": (1.0, "three")}
 
 
+def drive(start_s: float) -> Motion:
+    return Motion(start_s + np.array([0.0, 9.0]), np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]]))
+
+
+@pytest.mark.parametrize(("t", "place", "answer", "anew"), [
+    (2.0, 0.0, SILENT, True), (2.0, 0.0, ACCEPT, False),
+    (1.9, 0.0, SILENT, False),  # it would not be repeated yet
+    (2.0, 0.5, SILENT, False),  # it is on its way
+])  # fmt: skip
+def test_a_proposal_that_its_ugv_missed_is_planned_anew(t: float, place: float, answer: float, anew: bool) -> None:
+    policy = Scripted({"one": drive(1.3)}, {"one": drive(2.3)})
+    uav = replace(planner(policy), lead=0.2, retry=1.0)
+    memory = step(uav, uav.start(), 1.0, "one")
+    at = PLACES + np.array([[place, 0.0, 0.0], *np.zeros((3, 3))])
+    answers = np.array([answer, 0.0, *[SILENT, -1.0] * 2])
+    after = sent_after(memory, uav.plan(memory, t, at, [True, False, False], answers, NOBODY), t, uav.sender)
+    assert [proposal.issued for _, proposal in after.sent] == [1.0, *([t] if anew else [])]
+
+
+@pytest.mark.parametrize(
+    ("lead", "motions"), [(0.0, {"one": drive(1.6)}), (9.0, {"one": drive(1.3), "two": wait(9.0)})]
+)
+def test_a_proposal_in_time_and_a_part_of_a_joint_plan_are_repeated(lead: float, motions: dict[str, Motion]) -> None:
+    uav = replace(planner(Scripted(motions)), lead=lead, retry=1.0)
+    memory = step(uav, uav.start(), 1.0, "one")
+    assert in_force(step(uav, memory, 2.0, "one")) == in_force(memory)
+
+
 @pytest.mark.parametrize(("t", "two"), [(1.9, DONE), (2.0, SILENT)], ids=["executed", "run out"])
 def test_a_part_that_is_over_leaves_the_others_in_force(t: float, two: float) -> None:
     uav = planner(Scripted({"one": wait(9.0), "two": wait(2.0)}))
