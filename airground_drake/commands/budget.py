@@ -7,9 +7,10 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from airground_drake.base import files
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.parallel import processors
-from airground_drake.base.usage import refuse
+from airground_drake.base.usage import output_file, refuse
 from airground_drake.report.rules import DISTANCES
 from airground_drake.report.sentences import some
 from airground_drake.scenario.options import Parser, option, parser_of
@@ -39,6 +40,7 @@ def parser() -> Parser:
             "run": "with --vary (default: all runs)",
             "--json": "print all of it as JSON",
             "--vary": option("a key, such as channel.delay_s=0,0.1,0.3; without values some usual ones", "KEY=VALUES"),
+            "-o --output": option("with --vary: draw it, too, as SVG", "FILE", output_file),
             "--jobs": None,
             "--set": None,
         },
@@ -55,6 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _vary(scenario, options)
     if options.run is not None:
         return refuse(f"run {options.run!r}: a budget is the same for all runs; wanted: --vary, or no run")
+    if options.output is not None:
+        return refuse("--output draws what --vary finds: it needs --vary")
     groups = alike(budget(scenario))
     if options.json:
         print(json.dumps([_entry(group) for group in groups], indent=1))
@@ -83,6 +87,10 @@ def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
     rows = sweep(scenario, {key: values}, runs, [DISTANCES], options.jobs or processors())
     costs = [{"index": k} | _costs(scenario, key, value) for k, value in enumerate(values)]
     rows = rows.merge(DataFrame(costs))
+    if options.output is not None:
+        from airground_drake.report.view.budget import drawn
+
+        files.write_text(options.output, drawn(rows, key))
     if options.json:
         print(json.dumps(rows.astype(object).where(rows.notna(), None).to_dict("records"), indent=1))
     else:

@@ -1,6 +1,8 @@
 """`airground budget`: what is printed adds up, and the picture names each term."""
 
 import json
+from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -34,11 +36,12 @@ def test_beside_what_appears_it_says_what_has_to_be_clear(capsys: pytest.Capture
     assert "2.000 m of the body, also on its way of up to 3.000 m under commands already given" in told
 
 
-def test_one_imperfection_is_shown_by_its_values(capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_imperfection_is_shown_by_its_values(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Each value has its distances and its run; one that the scenario cannot have is named with the reason."""
+    picture = tmp_path / "varied.svg"
     key = "ugvs.cart1.plant.time_constant_s"
     asked = ["lagging", "d", "--set", "duration_s=0.5", "--vary", f"{key}=0.1,0.3,-1", "--jobs", "1"]
-    assert main([*asked, "--json"]) == 0
+    assert main([*asked, "-o", str(picture), "--json"]) == 0
     short, long, refused = json.loads(capsys.readouterr().out)
     for row, constant in ((short, 0.1), (long, 0.3)):
         main(["lagging", "--json", "--set", f"{key}={constant}"])
@@ -48,6 +51,7 @@ def test_one_imperfection_is_shown_by_its_values(capsys: pytest.CaptureFixture[s
         assert (row[key], row["SAFE-TRACE"], row["ugvs"]) == (constant, nothing_near, 2)
     assert (refused["ended"], refused["ugv law_m"]) == ("invalid", None)
     assert "-1 is not allowed" in refused["what"] or "-1.0 is not allowed" in refused["what"]
+    assert ElementTree.parse(picture).getroot().tag.endswith("svg")
     with pytest.raises(ScenarioError, match=r"did you mean period_s\?"):
         main(["lagging", "d", "--vary", "control.perid_s=1"])
     assert main(["lagging", "d"]) == 2
