@@ -116,5 +116,5 @@ def _law_of_uav(trace: Trace, name: str, samples: Rows) -> Law:
     below = limited(fed + control.formation_gain_1_s * (over - position), uav.max_speed_m_s)
     given, limit = as_seen(trace, name), uav.max_speed_m_s
     composition = "standing" if trace.scenario.position_error_m else "augmented"
-    command = avoiding(retreating(below, given, limit, planar=False), given, composition, planar=False)
+    command = avoiding(retreating(below, given, limit, planar=False), given, composition, planar=False, limit=limit)
     return Law(command, np.linalg.norm(recorded - command, axis=1))

@@ -17,7 +17,7 @@ from airground_drake.verify.runs.control_law import Inequalities as OfRun
 from airground_drake.verify.runs.pairs import parts_of
 from airground_drake.verify.runs.proposals import ProposalRecord
 from oracles.positions import unheard
-from oracles.projection import closest, least_violation, shortened
+from oracles.projection import CONTRADICTION_M_S, closest, least_violation, shortened
 
 MARGIN_M_S = 1e-12
 """The law's closest velocity keeps its inequalities by this much, m/s. Without it the corner of two nearly parallel
@@ -90,10 +90,13 @@ def limited(velocity: Array, limit: Array | float) -> Array:
     return np.asarray(velocity * np.minimum(1.0, limit / np.maximum(speed, 1e-300))[:, None])
 
 
-def avoiding(below: Array, given: Inequalities, composition: str, *, planar: bool) -> Array:
+def avoiding(
+    below: Array, given: Inequalities, composition: str, *, planar: bool, limit: Array | float = np.inf
+) -> Array:
     """The avoidance tasks above velocities (B, 3): the closest ones, or (5) as printed for `recursion_*`.
 
-    Where they contradict one another: those that miss the least, or for `standing` none.
+    Where they contradict one another: those that miss the least, or for `standing` none. `standing` is also none where
+    they ask for more than the speed limit, a number or (B,).
     """
     velocity = below.copy()
     missed = (given.slack(below) < 0.0).any(axis=1)
@@ -113,6 +116,8 @@ def avoiding(below: Array, given: Inequalities, composition: str, *, planar: boo
         standing = composition == "standing"
         found[~met] = 0.0 if standing else least_violation(normal[~met, :, :axes], level[~met])
     velocity[missed, :axes] = shortened(found, normal[:, :, :axes], bound)
+    if composition == "standing":
+        velocity[np.linalg.norm(velocity, axis=1) > limit + CONTRADICTION_M_S] = 0.0
     return velocity
 
 
@@ -179,12 +184,12 @@ def commanded(
     """
     composition, gain = composed(trace), trace.scenario.control.intervention_gain_1_s
     if trace.meta["method"] in ON_TOP:
-        velocity = avoiding(retreating(own, given, limit, planar=True), given, composition, planar=True)
+        velocity = avoiding(retreating(own, given, limit, planar=True), given, composition, planar=True, limit=limit)
         velocity[rows] = intervened(position[rows], velocity[rows], asked, gain, limit[rows])
         return velocity
     task = own.copy()
     task[rows] = intervened(position[rows], own[rows], asked, gain, limit[rows])
-    return avoiding(retreating(task, given, limit, planar=True), given, composition, planar=True)
+    return avoiding(retreating(task, given, limit, planar=True), given, composition, planar=True, limit=limit)
 
 
 def selected(sent: ProposalRecord) -> Array:

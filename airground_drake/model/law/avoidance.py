@@ -62,8 +62,8 @@ class Avoidance:
             projection over the active set, shortened to be exact in floating point. 'recursion_nearest' and
             'recursion_listed' apply (5) as printed to the same constraints, with the nearest or the first listed
             obstacle as highest priority. They are there to show that (5) is not safe.
-        stands: whether a robot stands where no velocity meets all constraints, for positions that are measured; by
-            default it takes the least violation. Only with 'augmented'.
+        stands: whether a robot stands where no velocity within its speed limit meets all constraints, for positions
+            that are measured; by default it takes the least violation. Only with 'augmented'.
 
     Raises:
         ValueError: if gain or sensing range is negative, the period not positive, or gain or period not finite.

@@ -112,10 +112,11 @@ def fill_half_spaces(
 
 
 @njit(cache=True)
-def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Array:
+def avoid_one(lower: Array, normal: Array, bound: Array, composition: int, max_speed: float = np.inf) -> Array:
     """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`, composed by (5) or as `Avoidance` says.
 
-    A `lower` that is not finite asks for nothing.
+    A `lower` that is not finite asks for nothing. Who stands where constraints contradict one another stands, too,
+    where only more than `max_speed`, m/s, would meet them.
     """
     if not is_finite(lower):
         lower = np.zeros(3)
@@ -131,7 +132,7 @@ def avoid_one(lower: Array, normal: Array, bound: Array, composition: int) -> Ar
         for k in range(len(bound)):
             if _dot(normal[k], velocity) < bound[k] - CONTRADICTION_M_S:
                 return np.zeros(3)
-        return velocity
+        return velocity if _dot(velocity, velocity) <= (max_speed + CONTRADICTION_M_S) ** 2 else np.zeros(3)
     return _recursion(lower, normal, bound, composition == RECURSION_NEAREST)
 
 
@@ -207,7 +208,7 @@ def commands(lower: Array, positions: Array, near: Neighbours, layer: Layer) -> 
             layer, which, normal, bound, retreat,
         )  # fmt: skip
         task = yielding(velocity[i], normal[:count], retreat[:count], max_speed[i])
-        velocity[i] = avoid_one(task, normal[:count], bound[:count], layer.composition)
+        velocity[i] = avoid_one(task, normal[:count], bound[:count], layer.composition, max_speed[i])
     return velocity
 
 

@@ -147,8 +147,8 @@ def command(
     if not executing or law.intervention_on_top:
         own = yielding(own, normal, retreat, ugv.max_speed)
     if not executing:
-        return avoid_one(own, normal, bound, composition)
-    below = avoid_one(own, normal, bound, composition) if law.intervention_on_top else own
+        return avoid_one(own, normal, bound, composition, ugv.max_speed)
+    below = avoid_one(own, normal, bound, composition, ugv.max_speed) if law.intervention_on_top else own
     task = below.copy()  # (20): v_int + (I - J_int^+ J_int) v, with v_int of (14)
     for b in range(3):
         wish = ugv.mobility[b] * (asked.rate[b] + law.intervention_gain * (asked.wanted[b] - ugv.position[b]))
@@ -161,7 +161,7 @@ def command(
     limit_one(task, ugv.max_speed)
     if law.intervention_on_top:
         return task
-    return avoid_one(yielding(task, normal, retreat, ugv.max_speed), normal, bound, composition)
+    return avoid_one(yielding(task, normal, retreat, ugv.max_speed), normal, bound, composition, ugv.max_speed)
 
 
 @njit(cache=True)

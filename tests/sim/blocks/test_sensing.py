@@ -159,6 +159,13 @@ def test_a_robot_stands_where_inequalities_contradict_one_another() -> None:
     assert kernels.avoid_one(wish, normal, bound - 0.2, kernels.STANDING).tolist() == pytest.approx([0.1, 0.5, 0.0])
 
 
+def test_a_robot_stands_where_inequalities_ask_for_more_than_its_speed_limit() -> None:
+    normal, bound = np.array([[1.0, 0.1, 0.0], [-1.0, 0.1, 0.0]]), np.array([0.1, 0.1])  # both: 1 m/s along y
+    wish = np.array([0.5, 0.5, 0.0])
+    assert kernels.avoid_one(wish, normal, bound, kernels.STANDING, 1.1)[1] == pytest.approx(1.0)
+    assert not kernels.avoid_one(wish, normal, bound, kernels.STANDING, 0.9).any()
+
+
 def any_bounds() -> st.SearchStrategy[Bounds]:
     numbers = st.tuples(*[st.floats(0.0, 0.3)] * 4, st.floats(0.5, 2.0), st.floats(0.001, 0.3))
     return numbers.map(lambda given: Bounds(*given[:4], speed_m_s=given[4], error_m=given[5]))
