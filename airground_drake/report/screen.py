@@ -110,8 +110,10 @@ def _headline(rows: Sequence[Row]) -> list[Line]:
 
 
 def _who(alike: Sequence[Row]) -> str:
-    helped = {row.facts.is_helped for row in alike if row.facts}
-    return "With or without the UAV" if len(helped) != 1 else "With the UAV" if True in helped else "Without the UAV"
+    runs = [row.facts for row in alike if row.facts]
+    helped = {run.is_helped for run in runs}
+    uav = "UAVs" if any(len(run.uavs) > 1 for run in runs) else "UAV"
+    return f"{'With or without' if len(helped) != 1 else 'With' if True in helped else 'Without'} the {uav}"
 
 
 def _rows(report: Report) -> list[Row]:

@@ -110,6 +110,13 @@ def lost(at_s: float) -> Edit:
     return lambda found: found["scenario"]["resolved"]["uav"].update(lost_at_s=at_s)
 
 
+def another_uav(found: Document) -> None:
+    given = found["scenario"]["resolved"]
+    given["uavs"] = {"fly": given.pop("uav"), "hover": {"start_m": AT_HOME, "target_m": AT_HOME}}
+    for run in found["runs"].values():
+        run["metrics"]["final_position_m"]["hover"] = AT_HOME
+
+
 def man(found: Document) -> None:
     found["scenario"]["resolved"]["obstacles"]["man"] = {"moves": {"waypoints_m": [AT_HOME] * 2, "speed_m_s": 1.0}}
 
@@ -274,6 +281,7 @@ BAD = hit(), MISSED, SHORT
          [("no", "With the UAV (d): 2 of 2 arrive, distances kept here, but not with every seed.")]),
         ("dp", [printed, only("p", gap(0.1))],
          [("yes", "With the UAV (d): 2 of 2 arrive, every distance kept.")]),
+        ("d", [another_uav], [("yes", "With the UAVs (d): 2 of 2 arrive, every distance kept.")]),
     ],
 )  # fmt: skip
 def test_headline(methods: str, edits: list[Edit], told: list[tuple[str, str]]) -> None:

@@ -17,7 +17,7 @@ from airground_drake.base.arrays import Array
 MAX_POINTS = 600  # maximum number of points of a line: two per pixel of a panel
 
 # Smallest width of a histogram, relative and absolute: floating point divides it, and numbers on its axis differ.
-NARROWEST, TINY = 1e-4, 1e-9
+NARROWEST, LEAST = 1e-4, 1e-3
 
 # Widths of panels on half and on the whole page; maximum height of a map; inches.
 WIDE_IN, FULL_IN, TALLEST_IN = 4.4, 11.6, 8.0
@@ -127,9 +127,9 @@ def thin(values: Array, limit: int = MAX_POINTS) -> npt.NDArray[np.intp]:
 
 
 def interval(values: Array) -> tuple[float, float]:
-    """Least and largest value; nearly equal values get an interval around them that is wide enough to draw."""
+    """Least and largest value; around nearly equal ones a wider interval: a 1e-4th of them, 1 mm or 1 ms at least."""
     low, high = float(values.min()), float(values.max())
-    missing = max(TINY, NARROWEST * max(abs(low), abs(high))) - (high - low)
+    missing = max(LEAST, NARROWEST * max(abs(low), abs(high))) - (high - low)
     return low - max(missing, 0.0) / 2.0, high + max(missing, 0.0) / 2.0
 
 
