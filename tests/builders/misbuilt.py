@@ -85,7 +85,7 @@ def half_rate(patch: pytest.MonkeyPatch) -> None:
             self.avoidance = law.avoidance
             self.law = law
 
-    patch.setattr("airground_drake.sim.diagram.UgvController", Slow)
+    patch.setattr("airground_drake.sim.blocks.positions.UgvController", Slow)
 
 
 MISBUILT: dict[str, tuple[Patch, str]] = {

@@ -29,6 +29,7 @@ def run(way_m: list[float], speed_m_s: float = 0.0) -> Run:
         position_m=places, body_m=places, apart=lambda _: own, bent_m=lambda _: 0.0,
         ways={name: Way(t, place) for name, place in places.items()},
         period_rows=lambda _: np.arange(len(t)), there=lambda _: slice(0, len(t)), robots={"ugv1": {}},
+        links={"delay_s": 0.0, "loss": 0.0},
         scenario={
             "control": {"period_s": PERIOD_S, "avoidance_gain_1_s": GAIN_1_S},
             "obstacles": {"rock": {"moves": None, "max_speed_m_s": speed_m_s}},

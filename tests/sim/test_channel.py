@@ -45,7 +45,7 @@ def test_a_channel_that_does_nothing_changes_nothing(scenario: str, name: str, m
 
 def test_without_a_channel_nothing_is_said_of_one() -> None:
     assert "channel" not in resolved(load("minimal"))
-    assert resolved(load("minimal", ["channel={}"]))["channel"] == asdict(Channel())
+    assert resolved(load("minimal", ["channel={}"]))["channel"] | {"ugvs": None} == asdict(Channel())
     assert load("minimal").digest != load("minimal", ["channel={}"]).digest
 
 

@@ -100,13 +100,18 @@ def _on_cluster(
         under_way = dask.as_completed(submit(0), loop=client.loop)
         for future in under_way:
             item = int(future.key.rpartition("-")[2])
-            result = None  # if its workers have died
-            with suppress(dask.scheduler.KilledWorker):
-                result = future.result()
-            yield item, result
+            yield item, _result(dask, future)
             for more in submit(under_way.count()):
                 under_way.add(more)
     except (CancelledError, OSError) as error:
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # or it shows how it fails to reconnect
         lost = f"the Dask scheduler was lost ({type(error).__name__}); --resume goes on with what is finished"
         raise AirgroundError(lost) from None
+
+
+def _result(dask: Any, future: Any) -> Any:
+    """The result of a finished item, or the exception of its work; None if its workers have died."""
+    try:
+        return future.result()
+    except dask.scheduler.KilledWorker:
+        return None
