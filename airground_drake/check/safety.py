@@ -371,11 +371,11 @@ def _without_message(run: Run) -> None:
             heard_s = column_of(run.samples, f"{robot}.heard_{other}_s")
             sample = np.searchsorted(run.sample_s, heard_s - SMALL).clip(0, len(heard_s) - 1)
             apart_m = np.linalg.norm(run.seen_m(robot) - run.seen_m(other)[sample], axis=1)
-            fastest = [run.robots[name]["max_speed_m_s"] + (own_of(run.robots[name]) or {}).get("drift_m_s", 0.0)
-                       for name in (robot, other)]  # fmt: skip
-            far = apart_m - fastest[1] * (run.sample_s - heard_s) >= pair.safe_m + sum(fastest) * period_s - SMALL
+            fastest = [run.robots[name]["max_speed_m_s"] for name in (robot, other)]
+            least_m = pair.safe_m + 2.0 * run.error_m + sum(fastest) * period_s
+            far = apart_m - fastest[1] * (run.sample_s - heard_s) >= least_m - SMALL
             way_m = period_s * np.linalg.norm(run.sampled(robot, "v", "m_s"), axis=1)
-            knows = far | (heard_s >= run.sample_s - SMALL)
+            knows = (np.abs(heard_s - run.sample_s) <= SMALL) | (far & (heard_s < run.sample_s))
             about = f"{robot}, {other}"
             stands = knows | (way_m <= SMALL)
             holds("standing without a message", stands, way_m, "0 m in a period", about=about, t_s=run.sample_s)

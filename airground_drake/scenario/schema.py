@@ -568,7 +568,7 @@ class Run:
     composition: Annotated[Words, one_of((), "model.law.avoidance:COMPOSITIONS")] = "augmented"
     """How avoidance is composed with the tasks below: 'augmented' or a reading of recursion (5)."""
     set: Annotated[dict[Words, OneValue], settings_of(SETTABLE)] = field(default_factory=dict)
-    """Other values in this run, by dotted key of `decision`, `gatekeeper` or `intervention`."""
+    """Other values in this run, by dotted key of `channel`, `decision`, `gatekeeper` or `intervention`."""
     stalls_m: dict[Name, GroundPoint] = field(default_factory=dict)
     """Points at which UGVs must end short of their target, by UGV."""
     expected: Annotated[dict[Words, Any], expected_of(RUN_CLAIMS)] = field(default_factory=dict)

@@ -99,10 +99,6 @@ def _ugv_links(scenario: Scenario) -> Problems:
     if decimal(link.delay_s) > decimal(period_s):
         told = f"at most control.period_s = {period_s:.9g} s: a robot publishes where it will be a period later"
         yield "channel.ugvs.delay_s", link.delay_s, f"{told}; control.period_s = {link.delay_s:.9g} would do"
-    for name, robot in scenario.robots.items() if link.delay_s else ():
-        if missed := plant_of(robot, period_s).bounds(robot.max_speed_m_s).drift_m_s:
-            key, told = f"{scenario.key_of(name)}.plant.drift_m_s", "0 with channel.ugvs.delay_s"
-            yield key, missed, f"{told}: {name} is not where it said that it would be"
 
 
 def _names(scenario: Scenario) -> Problems:
@@ -537,6 +533,16 @@ def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -
             yield these[i], those[j]
 
 
+def _standing(scenario: Scenario) -> Problems:
+    """Who is told to stand stands, and who says where it will be is there: no drift."""
+    told = ["sensing.position_error_m"] if scenario.position_error_m else []
+    told += [f"channel.ugvs.{key}" for key in ("delay_s", "loss") if getattr(scenario.ugv_links, key, 0.0)]
+    for name, robot in scenario.robots.items() if told else ():
+        if drift := plant_of(robot, scenario.control.period_s).bounds(robot.max_speed_m_s).drift_m_s:
+            allowed = f"0 with {told[0]}: {name} must stand where it is told to, and be where it says that it will be"
+            yield f"{scenario.key_of(name)}.plant.drift_m_s", drift, allowed
+
+
 def _measured(scenario: Scenario) -> Problems:
     """The law bears the errors of measured positions: its gain is large enough, and nothing may move by itself."""
     if not (error_m := scenario.position_error_m):
@@ -635,6 +641,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
     _uavs, _charges, _ugv_links, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants,
-    _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _measured, _budget,
+    _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _standing, _measured,
+    _budget,
     _reproduction, _choices,
 )  # fmt: skip

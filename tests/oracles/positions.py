@@ -42,18 +42,13 @@ def stands(trace: Trace, ugv: str) -> Flags:
         before = np.rint(since / trace.scenario.control.period_s).astype(np.intp)
         last = trace.as_seen(ugv, other)[np.arange(len(t)) - before]
         apart = np.linalg.norm(trace.as_seen(ugv, ugv) - last, axis=1)
-        due |= lacks[:, k] & (apart - _fastest(trace, other) * since <= _reach(trace, ugv, other))
+        due |= lacks[:, k] & (apart - trace.scenario.ugvs[other].max_speed_m_s * since <= _reach(trace, ugv, other))
     return due
 
 
-def _fastest(trace: Trace, ugv: str) -> float:
-    given = trace.scenario.ugvs[ugv].max_speed_m_s
-    return given + trace.plant(ugv).bounds(given).drift_m_s
-
-
 def _reach(trace: Trace, ugv: str, other: str) -> float:
-    step = (_fastest(trace, ugv) + _fastest(trace, other)) * trace.scenario.control.period_s
-    return pair_of(trace, ugv, other).law_m + step
+    step = sum(trace.scenario.ugvs[name].max_speed_m_s for name in (ugv, other)) * trace.scenario.control.period_s
+    return pair_of(trace, ugv, other).law_m + 2.0 * trace.scenario.position_error_m + step
 
 
 def wrong_positions(trace: Trace) -> list[Fault]:

@@ -119,9 +119,10 @@ class WaryUgvController(UgvController):
         n = len(world.names("ugv"))
         self._heard = self.DeclareVectorInputPort("heard_s", n * n)
         self._last_places = self.DeclareVectorInputPort("last_places", 3 * n * n)
-        # commands of UGVs and what their plants may miss of them, m/s
-        speed = np.array([body.max_speed_m_s + body.bounds.drift_m_s for body in world.moving[:n]])
-        self._speed, self._far = speed, _distances(self._near, n) + (speed[:, None] + speed) * law.avoidance.period
+        speed = np.array([body.max_speed_m_s for body in world.moving[:n]])
+        error = np.array([body.bounds.error_m for body in world.moving[:n]])
+        step = speed * law.avoidance.period + error
+        self._speed, self._far = speed, _distances(self._near, n) + step[:, None] + step
 
     def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
         """The law's commands; UGVs that lack a message stand, or leave out whom they know to be far."""

@@ -19,8 +19,8 @@ class SafeGate(SafeInv):
         "Under method (d) no intervention, accepted or not, leaves the safe set. The avoidance layer comes last, and "
         "from a safe state any command, scaled back far enough, meets every inequality; SAFE-INV does the rest. "
         "Neither the optimiser nor its horizon, nor the UAV as an adviser is trusted; as a robot the UAV must keep its "
-        "own share of each inequality. No hypothesis is about messages: a channel may lose them all. This is about "
-        "robots and bodies at rest. Beside an obstacle that may move, "
+        "own share of each inequality. No hypothesis is about messages between UAVs and UGVs: a channel may lose them "
+        "all. This is about robots and bodies at rest. Beside an obstacle that may move, "
         "nothing that the UAV asks for makes a robot bring itself too near: v = 0 meets the passive inequality, too."
     )
     latex = (

@@ -125,9 +125,10 @@ class SafeHyp(TraceClaim):
     summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."
     statement = (
         "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
-        "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run. Beside an obstacle that "
-        "may move the passive law held, and it moved no faster than declared: so d was kept in every period that "
-        "began at d + V h or more. The controllers were built with what the scenario says; one of the user's own is "
+        "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run, A / 2 for A where one of "
+        "two robots may have to stand. Beside an obstacle that may move the passive law held, and it moved no faster "
+        "than declared: so d was kept in every period that began at d + V h or more. The controllers were built with "
+        "what the scenario says; one of the user's own is "
         "judged by its steps alone. Where robots act on measured positions, the inequalities are those of the pair as "
         "measured, errors were within their bound, and d is that of the true bodies. Where messages between UGVs may "
         "be lost, a UGV stood unless it knew that those whose message it lacked were far."
@@ -137,8 +138,8 @@ class SafeHyp(TraceClaim):
         r"\end{cases}",
         r"\text{or} \quad D \ge d + \lVert p_i^{k+1} - p_i^k \rVert + \lVert p_j^{k+1} - p_j^k \rVert; \quad q = 1 "
         r"\text{ (obstacle)}, \; q = 1/2 \text{ (robot)}",
-        r"e = \max_k (e_i + e_j) \quad \Rightarrow \quad D \ge d - \frac{e}{A h}, \quad \frac{e}{A h} \le 10^{-9} "
-        r"\text{ m}",
+        r"e = \max_k (e_i + e_j) \quad \Rightarrow \quad D \ge d - \frac{e}{A' h}, \quad \frac{e}{A' h} \le 10^{-9} "
+        r"\text{ m}, \quad A' = A \text{ or } A/2",
         r"n^\top (p_i^{k+1} - p_i^k) \ge \min(0, \, d + V h - D) - e_i, \quad \lVert \dot{o}_j \rVert \le V \quad "
         r"\text{(obstacle that may move)}",
         r"D(0) \ge d, \quad A h \le 1, \quad \lVert v \rVert \le v_{\max}, \quad v_z = 0 \text{ (UGV)}, \quad "
@@ -301,7 +302,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         both = bounds[pair.first], bounds.get(pair.second, AT_REST)
         gain = of_law * Fraction(part_of_gain(*both))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
-        seen = partial(_seen, trace, pair, there) if pair.error_m or gain < of_law else None
+        seen = partial(_seen, trace, pair, there) if pair.error_m or part_of_gain(*both) < 1.0 else None
         missed = [
             shortfalls(first, place, pair.law_m, *asked, core, planar=planar, seen=seen(place) if seen else None)
             for place, core in beside
@@ -467,14 +468,16 @@ def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
     if trace.scenario.ugv_links is None or not trace.scenario.ugv_links.loss:
         return
     t, period, bounds = trace.sampled("t_s"), trace.scenario.control.period_s, bounds_of(trace)
-    speed = {ugv: bounds[ugv].speed_m_s + bounds[ugv].drift_m_s for ugv in trace.ugvs}
+    speed = {ugv: bounds[ugv].speed_m_s for ugv in trace.ugvs}
     for first, second in permutations(trace.ugvs, 2):
         heard = trace.sampled(f"{first}.heard_{second}_s")
         known = trace.as_seen(first, second)[np.searchsorted(t, heard - TIME_TOLERANCE_S).clip(0, len(t) - 1)]
         apart = np.linalg.norm(trace.as_seen(first, first) - known, axis=1) - speed[second] * (t - heard)
-        spare = apart - pair_of(trace, first, second).law_m - (speed[first] + speed[second]) * period
+        least = pair_of(trace, first, second).law_m + bounds[first].error_m + bounds[second].error_m
+        spare = apart - least - (speed[first] + speed[second]) * period
         driven = period * np.linalg.norm(trace.chosen(first), axis=1)
-        margin = np.where(heard < t - TIME_TOLERANCE_S, np.minimum(np.maximum(spare, 0.0 - driven), 0.0), 0.0)
+        unheard = np.where(heard < t, np.minimum(np.maximum(spare, 0.0 - driven), 0.0), -inf)  # -inf: heard later
+        margin = np.where(np.abs(heard - t) <= TIME_TOLERANCE_S, 0.0, unheard)
         yield _Hypothesis(UNHEARD, "m", t, margin, DISTANCE_TOLERANCE_M, {"first": first, "second": second})
 
 

@@ -204,6 +204,9 @@ def test_what_is_lost_depends_on_seed_and_sample_alone_and_starts_are_known() ->
     assert heard.tolist() == [bool(lost(1, 0.5, 4, k)[1, 2]) for k in range(len(heard))]
 
 
+DRIFTS = {"ugvs.ugv1.plant": {"kind": "mine.py:Mine", "drift_m_s": 0.1}}
+
+
 @pytest.mark.parametrize(
     ("links", "changes", "said"),
     [
@@ -216,6 +219,9 @@ def test_what_is_lost_depends_on_seed_and_sample_alone_and_starts_are_known() ->
         ({"loss": 1.0}, {}, "loss"),
         ({"loss": 0.2}, {"runs.a.set": {"channel.ugvs.loss": 0.9}}, "the same in all runs"),
         ({"loss": 0.2}, {"ugv_controller": {"kind": "mine.py:Mine"}}, "a controller of your own knows all positions"),
+        ({"loss": 0.2}, DRIFTS, r"ugv1\.plant\.drift_m_s: 0\.1 is not allowed; 0 with channel\.ugvs\.loss"),
+        ({"delay_s": 0.02}, DRIFTS, "0 with channel.ugvs.delay_s"),
+        ({}, {**DRIFTS, "sensing": {"position_error_m": 0.01}}, "0 with sensing.position_error_m"),
         ({"loss": 0.2}, {"sensing": {"position_error_m": 0.05}, "control.avoidance_gain_1_s": 5.0}, "at least 5.64"),
     ],
 )
