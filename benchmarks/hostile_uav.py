@@ -4,6 +4,7 @@ It may speak without a trigger, and at every planning instant. A `Tactic` says h
 `mutated` changes a part of it.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -15,7 +16,7 @@ from airground_drake.model.geometry import outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.geometry.outline import BASE, COUNT, EXTENT, GAP, MIDDLE, RADIUS
 from airground_drake.uav.database import Negotiation
-from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, Reports, Sighting, answer_to
+from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, Proposals, Reports, Sighting, answer_to
 from airground_drake.uav.planner import Planner, PlannerState
 from airground_drake.uav.policy import Proposal
 
@@ -90,9 +91,9 @@ class LyingPlanner(Planner):
     tactic: Tactic
     random: np.random.Generator
 
-    def idle(self, memory: PlannerState, intervening: Sequence[bool]) -> bool:
-        """Never idle."""
-        return False
+    def asleep_until(self, *_: Any) -> float:
+        """It never sleeps."""
+        return -math.inf
 
     def plan(
         self,
@@ -104,6 +105,7 @@ class LyingPlanner(Planner):
         reports: Reports,
         standing: Sequence[bool] = (),
         sightings: Sequence[Sighting] = (),
+        others: Proposals = (),
     ) -> PlannerState:
         """Speak, whatever the answers and reports."""
         return self._speak(memory, t, positions, answers)

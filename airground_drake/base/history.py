@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
+from threading import Lock
 from typing import Any, Generic, Self, TypeVar, overload
 
 Entry = TypeVar("Entry")
+_ONE_AT_A_TIME = Lock()  # simulations may go on from one state in several threads
 
 
 class History(Sequence[Entry], Generic[Entry]):
@@ -35,9 +37,10 @@ class History(Sequence[Entry], Generic[Entry]):
         if not more:
             return self
         after = type(self)()
-        newest = 0 < self._count == len(self._entries)  # an empty one may be the default of many
-        after._entries = self._entries if newest else self._entries[: self._count]
-        after._entries.extend(more)
+        with _ONE_AT_A_TIME:
+            newest = 0 < self._count == len(self._entries)  # an empty one may be the default of many
+            after._entries = self._entries if newest else self._entries[: self._count]
+            after._entries.extend(more)
         after._count = self._count + len(more)
         return after
 

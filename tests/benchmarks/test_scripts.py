@@ -4,6 +4,8 @@ import runpy
 from pathlib import Path
 
 import hostile
+import hostile_uav
+import numpy as np
 import pytest
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
@@ -32,3 +34,10 @@ def test_no_hostile_proposal_or_uav_brings_d_below_the_safe_distance() -> None:
     assert certified >= -1e-9
     assert executed > 0
     assert stolen <= bound
+
+
+def test_a_lying_uav_speaks_and_steals_no_more_than_the_bound() -> None:
+    tactic = hostile_uav.drawn(np.random.default_rng(2))
+    told = hostile.told(hostile.Lie(tactic, seed=2, believed=False))
+    assert told.margin_m >= -1e-9
+    assert 0.0 < told.stolen_s <= told.bound_s

@@ -170,7 +170,7 @@ def forged(report: Path, edit: Edit, *, mended: bool = True) -> Path:
 
 
 def _parts(value: Any) -> Any:
-    """What a value is made of; what a trace or a run has cached does not count."""
+    """What a value is made of."""
     if isinstance(value, dict):
         return [(key, _parts(part)) for key, part in value.items()]
     if isinstance(value, (list, tuple)):
@@ -184,16 +184,16 @@ def remembered(function: Callable[..., Any]) -> Callable[..., Any]:
     """As the function, but equal work is done once: most forgeries leave most runs as they are."""
     made: dict[bytes, Any] = {}
 
-    def once(*given: Any, **_: Any) -> Any:
-        key = hashlib.sha256(pickle.dumps(_parts(given))).digest()
+    def once(*given: Any, progress: Any = None, **named: Any) -> Any:
+        key = hashlib.sha256(pickle.dumps(_parts((given, named)))).digest()
         if key not in made:
-            made[key] = function(*given)
+            made[key] = function(*given, **named)
         return made[key]
 
     return once
 
 
-_done = remembered(lambda work, *given: work(*given))
+_done = remembered(lambda work, *given, **named: work(*given, **named))
 REMEMBERED = {
     (checks, "DECIDED"): {claim: remembered(of_run) for claim, of_run in checks.DECIDED.items()},
     (document, "_run"): remembered(document._run),
@@ -204,5 +204,9 @@ REMEMBERED = {
 def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
     """As `judge_all`, but equal work is done once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judging, "run_parallel", lambda pieces, **_: [_done(piece.func, *piece.args) for piece in pieces])
+        patch.setattr(
+            judging,
+            "run_parallel",
+            lambda pieces, **_: [_done(piece.func, *piece.args, **piece.keywords) for piece in pieces],
+        )
         return judge_all(scenario, traces)

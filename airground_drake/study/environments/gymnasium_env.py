@@ -121,6 +121,12 @@ class InterventionVectorEnv(gymnasium.vector.SyncVectorEnv):
 
         super().__init__([lambda: first, *[another] * (num_envs - 1)])
 
+    def step(self, actions: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers, dict[str, Any]]:
+        """A step of each environment; ValueError, before any of them has made one, if an action is missing."""
+        if len(actions) != self.num_envs:
+            raise ValueError(f"{len(actions)} actions; wanted: {self.num_envs}")
+        return super().step(actions)
+
 
 gymnasium.register(
     id=ID,

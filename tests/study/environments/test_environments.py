@@ -381,7 +381,7 @@ def test_the_registered_environment_needs_no_arguments() -> None:
     assert (several.reset(seed=1)[0][0] == observation).all()
     with pytest.raises(ValueError, match="num_envs is 0; allowed: a whole number from 1"):
         InterventionVectorEnv(0)
-    with pytest.raises(ValueError, match="argument 2 is longer"):
+    with pytest.raises(ValueError, match="1 actions; wanted: 2"):
         several.step(np.zeros((1, 5), dtype=np.float32))
 
 
