@@ -10,6 +10,7 @@ from airground_drake.study.environments.sources import needed
 with needed():
     import gymnasium
 
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.scenario.schema import Scenario
 from airground_drake.study.campaign.spec import Spec
 from airground_drake.study.environments.encoding import Encoding, Numbers
@@ -121,7 +122,7 @@ class InterventionVectorEnv(gymnasium.vector.SyncVectorEnv):
 
         super().__init__([lambda: first, *[another] * (num_envs - 1)])
 
-    def step(self, actions: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers, dict[str, Any]]:
+    def step(self, actions: Numbers) -> tuple[Any, Array, Flags, Flags, dict[str, Any]]:
         """A step of each environment; ValueError, before any of them has made one, if an action is missing."""
         if len(actions) != self.num_envs:
             raise ValueError(f"{len(actions)} actions; wanted: {self.num_envs}")
