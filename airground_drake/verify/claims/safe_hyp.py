@@ -476,7 +476,8 @@ def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
         least = pair_of(trace, first, second).law_m + bounds[first].error_m + bounds[second].error_m
         spare = apart - least - (speed[first] + speed[second]) * period
         driven = period * np.linalg.norm(trace.chosen(first), axis=1)
-        unheard = np.where(heard < t, np.minimum(np.maximum(spare, 0.0 - driven), 0.0), -inf)  # -inf: heard later
+        spare[heard > t] = -inf  # heard at no time so far
+        unheard = np.minimum(np.maximum(spare, 0.0 - driven), 0.0)
         margin = np.where(np.abs(heard - t) <= TIME_TOLERANCE_S, 0.0, unheard)
         yield _Hypothesis(UNHEARD, "m", t, margin, DISTANCE_TOLERANCE_M, {"first": first, "second": second})
 

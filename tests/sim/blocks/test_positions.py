@@ -204,6 +204,16 @@ def test_what_is_lost_depends_on_seed_and_sample_alone_and_starts_are_known() ->
     assert heard.tolist() == [bool(lost(1, 0.5, 4, k)[1, 2]) for k in range(len(heard))]
 
 
+def test_a_position_that_is_heard_at_no_time_so_far_is_not_heard() -> None:
+    trace = run(0, 0.5)
+    samples = trace.samples.assign(**{"ugv1.heard_ugv2_s": 1e9})
+    (verdict,) = judge(replace(trace, samples=samples), ["SAFE-HYP"])
+    assert (verdict.status, verdict.counterexample["hypothesis"]) == ("refuted", "standing without a message")
+    ours = safety.safe_hyp(Run(trace.run, resolved(trace.scenario), trace.events, trace.states, samples))
+    assert ours.because is not None
+    assert ours.because.rule == "standing without a message"
+
+
 DRIFTS = {"ugvs.ugv1.plant": {"kind": "mine.py:Mine", "drift_m_s": 0.1}}
 
 
