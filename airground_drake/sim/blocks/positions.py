@@ -143,13 +143,14 @@ class WaryUgvController(UgvController):
         accepted: Sequence[Proposal | None], headings: Array | None, law: UgvLaw,
     ) -> Array:  # fmt: skip
         """The command of UGV i, (3,), m/s, by the law as if some UGVs were beyond its sensing range."""
-        known, near, one = positions.copy(), self._world.at(self._near, t), slice(i, i + 1)
+        known, near = positions.copy(), self._world.at(self._near, t)
+        row = slice(i, i + 1)
         known[near.members[left_out]] = known[near.members[i]] + [2.0 * law.avoidance.sensing_range, 0.0, 0.0]
-        near = near._replace(**{name: getattr(near, name)[one] for name in OF_ROBOTS})
+        near = near._replace(**{name: getattr(near, name)[row] for name in OF_ROBOTS})
         steering, motion = self._world.steering, accepted[i]
-        steered = None if steering is None or headings is None else (headings[one], steering[one])
+        steered = None if steering is None or headings is None else (headings[row], steering[row])
         asked = [None if motion is None else asked_at(motion, t)]
-        velocity: Array = law.velocity(known, near, reference[one], rate[one], asked, steered)[0]
+        velocity: Array = law.velocity(known, near, reference[row], rate[row], asked, steered)[0]
         return velocity
 
 
