@@ -180,7 +180,8 @@ def _arrived(run: RunFacts) -> Cell:
     if not away:
         last = max((run.arrived_s.get(ugv, 0.0) for ugv in run.ugvs), default=0.0)
         astray = [uav for uav in run.uavs if uav not in run.home]
-        told = ["the UAV did not"] if astray == run.uavs else [f"{some(astray, MOST_NAMES)} did not"] if astray else []
+        who = "the UAV" if astray == run.uavs and len(astray) == 1 else some(astray, MOST_NAMES)
+        told = [f"{who} did not"] if astray else []
         return Cell("partly" if astray else "yes", [f"{count}, by {last:.1f} s", *told])
     goal = run.claim(rules.ARRIVAL)
     as_declared = " (as declared)" if goal.as_expected is True else ""
