@@ -640,7 +640,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _uavs, _charges, _ugv_links, _names, _reserved, _shapes, _map, _blocks, _route, _runs, _plants,
+    _uavs, _names, _reserved, _charges, _ugv_links, _shapes, _map, _blocks, _route, _runs, _plants,
     _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _standing, _measured,
     _budget,
     _reproduction, _choices,
