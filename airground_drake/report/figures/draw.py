@@ -151,6 +151,7 @@ def _trajectories(chosen: _Selection) -> Figure:
     circles = "dark disc as large as it is, " if true_size else ""
     circles += "band around them: too near" if has_walls else "safe circle dashed"
     hidden = len(first.ugvs) - len(chosen.team)
+    dashed = " Thin dashed lines: the UAVs." if len(first.uavs) > 1 else " Thin dashed line: the UAV."
     thin = f" Thin grey lines, which end in dots: {hidden} more UGVs." if hidden else ""
     frame_is = " Frame: the arena." if first.scenario.arena_m else ""
     frame_is += " Dots: ways of obstacles, drawn where they start." if any(len(body.way_m) for body in barriers) else ""
@@ -162,7 +163,7 @@ def _trajectories(chosen: _Selection) -> Figure:
         marks += " Thick: the UGV follows the UAV."
     caption = (
         f"○ start, \N{MULTIPLICATION SIGN} target{marks} "
-        f"{'. '.join(kinds)} (hollow: not on the UAV's map), {circles}.{frame_is} Thin dashed line: the UAV.{thin}"
+        f"{'. '.join(kinds)} (hollow: not on the UAV's map), {circles}.{frame_is}{dashed}{thin}"
     )
     robots = [*chosen.team, *first.uavs]
     panels = []
