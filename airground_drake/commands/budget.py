@@ -13,6 +13,7 @@ from airground_drake.base.parallel import processors
 from airground_drake.base.usage import output_file, refuse
 from airground_drake.report.rules import DISTANCES
 from airground_drake.report.sentences import some
+from airground_drake.scenario import plugins
 from airground_drake.scenario.options import Parser, option, parser_of
 from airground_drake.study.campaign.rows import JUDGED
 
@@ -43,6 +44,7 @@ def parser() -> Parser:
             "-o --output": option("with --vary: draw it, too, as SVG", "FILE", output_file),
             "--jobs": None,
             "--set": None,
+            plugins.OPTION: None,
         },
     )
 
@@ -84,7 +86,9 @@ def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
     usual = next(values for unit, values in USUAL.items() if key.endswith(unit))
     values = parsed(f"[{given}]", "--vary").data or usual
     runs = [options.run] if options.run else ()
-    rows = sweep(scenario, {key: values}, runs, [DISTANCES], options.jobs or processors())
+    allow, jobs = options.allow_plugins, options.jobs or processors()
+    with plugins.admitted(scenario, options.scenario, allow=allow):
+        rows = sweep(scenario, {key: values}, runs, [DISTANCES], jobs, allow_plugins=allow)
     costs = [{"index": k} | _costs(scenario, key, value) for k, value in enumerate(values)]
     rows = rows.merge(DataFrame(costs))
     if options.output is not None:

@@ -56,3 +56,19 @@ def test_one_imperfection_is_shown_by_its_values(capsys: pytest.CaptureFixture[s
         main(["lagging", "d", "--vary", "control.perid_s=1"])
     assert main(["lagging", "d"]) == 2
     assert "wanted: --vary, or no run" in capsys.readouterr().err
+
+
+def test_third_party_code_is_not_imported(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether the scenario or a value names it, and though a file in the current folder has the scenario's name."""
+    (tmp_path / "evil.py").write_text("raise SystemExit('imported')\n")
+    (tmp_path / "minimal").touch()
+    monkeypatch.chdir(tmp_path)
+    asked, own = ["minimal", "d", "--jobs", "1", "--set", "duration_s=0.5"], "{name: 'evil.py:Evil'}"
+    with pytest.raises(ScenarioError, match="only with --allow-plugins"):
+        main([*asked, "--vary", "control.period_s=0.05", "--set", f"intervention.policies=[{own}]"])
+    assert main([*asked, "--json", "--vary", f"intervention.policies=[{own}]"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)
+    assert row["ended"] == "invalid"
+    assert "only with --allow-plugins" in row["what"]

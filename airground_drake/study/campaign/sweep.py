@@ -9,6 +9,7 @@ import pandas as pd
 
 from airground_drake.base.errors import ScenarioError, UnknownNameError
 from airground_drake.base.registry import RUN_CLAIMS
+from airground_drake.scenario import plugins
 from airground_drake.scenario.document import UNKNOWN_KEY
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.scenario.load import resolved, validated
@@ -27,6 +28,8 @@ def sweep(
     runs: Collection[str] = (),
     claims: Collection[str] = (),
     jobs: int = 1,
+    *,
+    allow_plugins: bool = True,
 ) -> pd.DataFrame:
     """Simulate and judge the runs of a scenario for every combination of values.
 
@@ -36,12 +39,13 @@ def sweep(
         runs: names of runs; default: all of the scenario.
         claims: identifiers of claims about runs; default: all.
         jobs: number of processes.
+        allow_plugins: whether third-party code that the scenario or a value names may be imported.
 
     Returns:
         A row for each combination and run, see `swept.per_run`. `ended` says `judged`, or why not; `what` explains it.
 
     Raises:
-        ScenarioError: if the scenario is not valid, or a key or a run does not exist.
+        ScenarioError: if the scenario is not valid, a key or a run does not exist, or third-party code is not allowed.
         UnknownNameError: if a claim does not exist.
         ValueError: if a key has no values.
     """
@@ -49,15 +53,17 @@ def sweep(
     if empty := [key for key, given in values.items() if not len(given)]:
         raise ValueError(f"no values for {', '.join(empty)}; wanted: a list of at least one value")
     spec = Spec(
-        name=scenario.name, scenario=scenario.name, runs=tuple(runs), claims=tuple(claims), digest="", source="sweep",
+        name=scenario.name, scenario=scenario.name, runs=tuple(runs), claims=tuple(claims), digest="", source="",
         drawn={key: Key(GRID, list(given)) for key, given in values.items()}, data=resolved(scenario) | NOT_JUDGED,
     )  # fmt: skip
     for kind, names, allowed in (("run", runs, scenario.runs), ("claim", claims, RUN_CLAIMS)):
         for name in names:
             if name not in allowed:
                 raise UnknownNameError(kind, name, allowed)
+    if not allow_plugins:
+        plugins.refuse(scenario, scenario.name)
     _require_keys(spec)
-    work = partial(rows_of, spec, limits=DEFAULT_LIMITS._replace(plugins=True))
+    work = partial(rows_of, spec, limits=DEFAULT_LIMITS._replace(plugins=allow_plugins))
     indices = range(spec.combinations)
     if jobs == 1:
         draws = {index: work(index) for index in indices}

@@ -107,9 +107,12 @@ def rows_of_scenario(
 def _within(spec: Spec, scenario: Scenario, limits: Limits) -> Iterator[None]:
     """Find or refuse third-party code; limit the time of the body."""
     within(scenario, limits)
+    if not limits.plugins:
+        plugins.refuse(scenario, spec.scenario)
+    allow = limits.plugins and bool(spec.source)  # without a source, the scenario is no file either
     with (
-        plugins.admitted(scenario, spec.scenario, allow=limits.plugins),
-        plugins.beside(spec.source, allow=limits.plugins),
+        plugins.beside(spec.scenario, allow=allow),
+        plugins.beside(spec.source, allow=allow),
         time_limit(limits.time, DrawOutOfTime),
     ):
         yield
