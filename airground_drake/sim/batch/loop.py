@@ -50,7 +50,7 @@ class Team(NamedTuple):
     law: Numbers  # of the UGVs
     layer: Layer  # of the UAV
     uav: Array  # altitude, m, and gain of its task, 1/s, (2,)
-    steering: Array  # of the UGVs, (n, 5)
+    steering: Array  # of the UGVs, (n, NUMBERS)
     turns: bool  # whether a UGV is a unicycle
     levels: Array  # of the trigger, (3,)
     corners: Corners  # of the presets

@@ -54,8 +54,8 @@ class Batch:
     """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
 
     # Left to Drake: users' plants and controllers, channels, errors of positions, several UAVs, one that is lost, tasks
-    # of the UAV that are not the package's. Monitors, observers, decision blocks and disturbances are no part of a
-    # scenario.
+    # of the UAV that are not the package's, gatekeepers with a limit by the clock. Monitors, observers, decision blocks
+    # and disturbances are no part of a scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
         """Set it up: everything that does not depend on the seed."""
@@ -79,6 +79,8 @@ class Batch:
             raise LeftToDrakeError("several UAVs")
         if uav.lost_at_s:
             raise LeftToDrakeError("a UAV that is lost")
+        if given.gatekeeper.budget == "wall_clock" and method.gated:
+            raise LeftToDrakeError("a gatekeeper with a limit by the clock")
         if given.ugv_controller is not None:
             raise LeftToDrakeError(f"the controller {given.ugv_controller.kind} of the UGVs")
         if UAV_TASKS.load(uav.task, of=Task) is not FormationTask:

@@ -15,7 +15,7 @@ from airground_drake.report.difference import first_difference
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.batch import noise
-from airground_drake.sim.batch.run import Batch
+from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.sim.simulation import Recorder, simulate
 from airground_drake.study.testing.strategies import scenarios
 from airground_drake.uav.planner import Planner
@@ -141,6 +141,8 @@ def test_what_is_left_to_drake(capsys: pytest.CaptureFixture[str]) -> None:
         "note: Drake's Simulator makes run a: the loop leaves it a decision block of your own, observers or a speed\n"
     )
     assert capsys.readouterr().err == said
+    with pytest.raises(LeftToDrakeError, match="by the clock"):
+        Batch(load("case_a", ["gatekeeper.budget=wall_clock"]), "c")
 
 
 def test_an_engine_that_does_not_exist_is_named() -> None:
