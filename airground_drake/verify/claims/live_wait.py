@@ -44,7 +44,7 @@ class LiveWait(TheoremClaim):
         "cost only messages. Safety is SAFE-GATE."
     )
 
-    theorems: tuple[str, ...] = ("Patience.bounded",)
+    theorems = ("Patience.bounded",)
     about_the_law = True
     margin_of = "longest intervention allowed"
 

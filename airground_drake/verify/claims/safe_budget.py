@@ -64,7 +64,7 @@ class SafeBudget(TheoremClaim):
         "That the steered points keep the law's distance (SAFE-INV does), or that a command was met in full: a "
         "shortened command recovers a distance at a smaller gain."
     )
-    theorems: tuple[str, ...] = ()
+    theorems: tuple[str, ...] = (*BASIC, *OF_ERRORS, *BESIDE_MOVING, "Plants", "Turning", "Mixed")
     margin_of = "distance in the law less what the plants take"
 
     def applies(self, scenario: Scenario) -> bool:

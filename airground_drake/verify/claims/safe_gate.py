@@ -45,7 +45,7 @@ class SafeGate(SafeInv):
     )
 
     about_the_law = True
-    theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always", "Passive.own_doing")
+    theorems = ("Gate.scaled_back", "Gate.no_faster", "Safety.standing", "Safety.safe_always", "Passive.own_doing")
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         return {**super().inputs(scenario), "intervention_on_top": METHODS["d"].intervention_on_top}

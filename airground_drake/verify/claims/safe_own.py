@@ -50,6 +50,7 @@ class SafeOwn(TraceClaim):
         "got out of its way. It says nothing about any other run."
     )
 
+    theorems = ("Passive.own_doing", "Passive.since", "Turning.shortened_obeys", "Plants.unicycle_stands")
     exercised_by = "control periods in which an obstacle that may move was within reach"
 
     def applies(self, trace: Trace) -> bool:

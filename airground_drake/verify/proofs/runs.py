@@ -31,6 +31,11 @@ FOUND = "proofs.json"  # file in that folder with the results
 # Part of Coq's message if a checker has computed `false` where the proof says `true`.
 COMPUTED = "is expected to have type"
 CHECKERS = ("DistanceChecker.v", "LawChecker.v")
+# Theorems and theories whose hypotheses the files of a run meet.
+THEOREMS = (
+    "DistanceChecker", "LawChecker", "Run", "Mixed.first_order", "Mixed.entry_keeps", "Mixed.run_all",
+    "Mixed.from_rest",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
