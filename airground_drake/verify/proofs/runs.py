@@ -10,6 +10,7 @@ from typing import Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base.registry import DISTANCES
 from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.sim.trace import Trace, load
 from airground_drake.verify.proofs import coq, readback
@@ -188,8 +189,8 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
 
 
 def expects_kept(run: Trace) -> bool:
-    """Whether the scenario expects that the run keeps its distances: SAFE-TRACE is promised, and not to be refuted."""
-    expected = run.scenario.runs[run.run].expected.get("SAFE-TRACE", "holds")
+    """Whether the scenario expects that the run keeps its distances: the claim is promised, and not to be refuted."""
+    expected = run.scenario.runs[run.run].expected.get(DISTANCES, "holds")
     return declared(expected) != NOTHING and "refuted" not in expected
 
 
