@@ -23,8 +23,9 @@ from airground_drake.verify.proofs.export import (
     refuse_unknown,
     without_vectors,
 )
-from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, closure, digest
+from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, closure, digest
 from airground_drake.verify.proofs.table import Entry, Missed, TooNear, entries, law_file, lawful, missed, too_near
+from airground_drake.verify.proofs.theorems import FOLDER
 
 SCHEMA = "airground_drake.proofs/1"
 PLACE = "proofs"  # folder of a report for what is proved about it
