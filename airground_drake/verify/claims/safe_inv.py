@@ -58,7 +58,7 @@ class SafeInv(TheoremClaim):
         "inequalities. That the program computes these inequalities is for tests and SAFE-HYP to show."
     )
 
-    theorems = (
+    theorems: tuple[str, ...] = (
         "Safety.lemma",
         "Safety.lemma_in_the_plane",
         "Convex.leads_away",
