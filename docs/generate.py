@@ -38,7 +38,7 @@ from airground_drake.scenario.shipped import shipped
 from airground_drake.sim import graphviz
 from airground_drake.sim.diagram import build_diagram, method_drawn
 from airground_drake.verify.claim import Claim
-from airground_drake.verify.proofs import THEOREMS
+from airground_drake.verify.proofs import THEOREMS, runs
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
@@ -127,11 +127,13 @@ def extending() -> str:
 def theorems() -> str:
     """Each theorem: its statement, its hypotheses, and the claims that check these."""
     lines, file = [], ""
+    checks = {"airground prove DIR": runs.THEOREMS, **{name: claim.theorems for name, claim in _claims()}}
     for name, theorem in THEOREMS.items():
         if file != (file := name.partition(".")[0]):
             lines += ["", f"### {file}", ""]
+        checked_by = [where for where, theorems in checks.items() if {name, file} & {*theorems}]
         takes = f" *Takes:* {' '.join(theorem.hypotheses)}" if theorem.hypotheses else ""
-        where = f" *Checked by:* {', '.join(theorem.checked_where)}." if theorem.checked_where else ""
+        where = f" *Checked by:* {', '.join(checked_by)}." if theorem.hypotheses else ""
         about = "" if theorem.equation == "ours" else f", {theorem.equation}"
         lines.append(f"- **`{name}`**{about}: {theorem.statement}{takes}{where}")
     return "\n".join(lines)

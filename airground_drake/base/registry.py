@@ -342,6 +342,7 @@ RUN_CLAIMS = Registry(
     _claims("SAFE-TRACE SAFE-OWN SAFE-HYP ZENO-TRACE THR-TRIG THR-QUALITY GATE-PLAN LIVE-HYP LIVE-GOAL"),
 )
 
+DISTANCES = "SAFE-TRACE"  # the claim that all distances were kept, which `airground prove` also asks Coq about
 ARRIVAL = "LIVE-GOAL"  # the claim that every robot ends where it is to end; a preset must lead there, or it may fail
 
 # Claims about the model, in the order of the report: subclasses of `verify.claim.ModelClaim`.

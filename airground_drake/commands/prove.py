@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from airground_drake.base.registry import DISTANCES
 from airground_drake.base.usage import positive, refuse
-from airground_drake.report.rules import DISTANCES
 from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from airground_drake.base.statuses import PASSING
 RunFacts = Any  # `facts.RunFacts`, which reads the names of claims here
 
 # Claims about a run: its distances, the conditions of the proof, what the robots did themselves, where they ended.
-DISTANCES, CONDITIONS, OWN_DOING, ARRIVAL = "SAFE-TRACE", "SAFE-HYP", "SAFE-OWN", registry.ARRIVAL
+DISTANCES, CONDITIONS, OWN_DOING, ARRIVAL = registry.DISTANCES, "SAFE-HYP", "SAFE-OWN", registry.ARRIVAL
 # Claims that prove the distances of method (d); the other one joins them for bodies off their steered points.
 PROOFS, PROOF_OF_PLANTS = ("SAFE-INV", "SAFE-GATE"), "SAFE-BUDGET"
 # Claims about the gaps between triggers: that they have a bound, those of a run, and those under finer noise.

@@ -58,7 +58,7 @@ class _Process:
         if by > 0.0:
             self._since = time.monotonic()
         elif self.process.is_alive() and time.monotonic() - self._since > STANDSTILL_S:
-            raise SimulationError(self._name, self._before, f"no further after {STANDSTILL_S:g} s of waiting")
+            raise SimulationError(self._name, self._before, f"no progress in the last {STANDSTILL_S:g} s")
         return by
 
     def trace(self) -> Trace:

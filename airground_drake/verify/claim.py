@@ -65,6 +65,7 @@ class Claim(abc.ABC):
         assumptions: what is taken for granted.
         does_not_establish: what a reader must not conclude from it.
         expected: the status that a scenario expects unless it says otherwise.
+        theorems: theorems, such as "Safety.unseen", or theories, such as "Plants", whose hypotheses it checks.
         exercised_by: what its findings count as `exercised`, in words that follow a number; '' if they count nothing.
         about_the_law: whether it is about the package's control law or its predictions: it is `not_run`, and that is
             expected, where a controller of the user's own commands the UGVs.
@@ -77,6 +78,7 @@ class Claim(abc.ABC):
     assumptions: tuple[str, ...]
     does_not_establish: str
     expected: Status
+    theorems: tuple[str, ...] = ()
     exercised_by: str = ""
     subject: str = ""
     summary: str = ""

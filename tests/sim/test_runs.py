@@ -66,7 +66,7 @@ def test_a_run_that_comes_no_further_is_ended(case_a: Scenario, monkeypatch: pyt
     hangs = task(lambda: time.sleep(600.0))
     monkeypatch.setattr(UAV_TASKS, "load", lambda name, of: hangs)
     monkeypatch.setattr(runs, "STANDSTILL_S", 0.5)
-    with UAV_TASKS.adding("of_the_test", hangs), pytest.raises(SimulationError, match=r"no further after 0\.5 s"):
+    with UAV_TASKS.adding("of_the_test", hangs), pytest.raises(SimulationError, match=r"no progress in the last 0\.5"):
         simulate_all(one_run(case_a), jobs=1)
 
 

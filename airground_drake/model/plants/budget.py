@@ -1,6 +1,6 @@
 """What distance the law keeps so that the bodies keep the distance promised (the distance budget).
 
-The law steers a point. The theorems of `verify/coq/` (Budget, Plants, Pieces, PassivePlants) say how far a body may be
+The law steers a point. The theorems of `verify/coq/` (Budget, Plants, Pieces, Passive) say how far a body may be
 from it, and what that costs. For two bodies that keep d, with the bounds of `Bounds` and the gain A of the law,
 
     d_law = d + b + covers + dips + (drift_i + drift_j) / A,

@@ -4,7 +4,7 @@ import copy
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from numbers import Integral
 from typing import Any, Self
 
@@ -80,7 +80,7 @@ class Source:
         self.ugvs = tuple(first.ugvs)
         if isinstance(given, Spec) and given.course is not None:
             self.ugvs = given.course.names
-        self._stage = lru_cache(MOST_STAGES)(self._made)
+        self._stage = lru_cache(MOST_STAGES)(partial(_stage, self._given, self._run))
 
     def drawn(self, rng: np.random.Generator) -> int:
         """The number of an episode, drawn."""
@@ -97,9 +97,10 @@ class Source:
             return Episode(self._stage(0), number)
         return Episode(self._stage(number))
 
-    def _made(self, number: int) -> Stage:
-        scenario = self._given.draw(number) if isinstance(self._given, Spec) else self._given
-        return Stage(with_agent(scenario, self._run), self._run)
+
+def _stage(given: Scenario | Spec, run: str, number: int) -> Stage:
+    scenario = given.draw(number) if isinstance(given, Spec) else given
+    return Stage(with_agent(scenario, run), run)
 
 
 class Episodes:

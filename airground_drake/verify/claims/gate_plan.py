@@ -56,10 +56,10 @@ class GatePlan(GateClaim):
     summary = "Every decision rests on a plan that is feasible and costs what was recorded."
     statement = (
         "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
-        "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of at "
-        "most half a stage. Under method (d) a plan is one of two choices for good: no decision chose to stop short of "
-        "the goal where the other choice would not, or would stop nearer to it. The margin is no condition: it is the "
-        "largest gap between the cost of a plan and the optimum of the half-plane problem, where that is known."
+        "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of "
+        "at most half a stage. Under method (d) a decision accepts or refuses for good: it never chose to stop short "
+        "of the goal if the other choice would reach it, or stop nearer to it. The margin decides nothing: it is the "
+        "largest known gap between the cost of a plan and the optimum of the half-plane problem."
     )
     latex = (
         r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "

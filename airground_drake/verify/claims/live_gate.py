@@ -21,8 +21,9 @@ class LiveGate(LiveWait):
     id = "LIVE-GATE"
     summary = "An accepted intervention is carried through to its end, unless a new obstacle is sensed."
     statement = (
-        "Under method (d) an accepted intervention is never reversed as long as no obstacle is sensed that was not "
-        "known at its acceptance, and is over when its motion is, or when it has lasted as long as it may."
+        "Under method (d) a UGV gives back an accepted intervention early only if it senses an obstacle that it did "
+        "not know when it accepted. Otherwise the intervention ends with its motion, or after the longest time "
+        "allowed."
     )
     latex = (
         r"\text{accepted}(t) \text{ for } t_0 \le t < \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}})",

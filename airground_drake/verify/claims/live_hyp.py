@@ -17,8 +17,8 @@ class LiveHyp(GateClaim):
     summary = "No UGV followed the UAV more often or longer than it may, or changed its mind without a new obstacle."
     statement = (
         "Between two rests, no UGV accepted more proposals than it may, and none executed proposals for longer than "
-        "LIVE-WAIT allows. Every acceptance was over in time. No UGV gave back a proposal earlier, unless it sensed an "
-        "obstacle for the first time that was not on the proposal's map."
+        "LIVE-WAIT allows. Every acceptance ended in time. No UGV gave a proposal back early, unless it first sensed "
+        "an obstacle that was not on the proposal's map."
     )
     formula = (
         "between two rests of rest_s on its own: acceptances <= tries, time executed <= tries (longest_s + h); "

@@ -21,9 +21,9 @@ class LiveWait(TheoremClaim):
     id = "LIVE-WAIT"
     summary = "No UAV can keep a UGV from its own task for ever."
     statement = (
-        "Under method (d) no UAV keeps a UGV from its own task for longer than a bound, whatever it proposes, "
-        "withdraws, says of its map or names as its cause, and whatever a channel does to its messages: after so long "
-        "the UGV is on its own until it has rested."
+        "Under method (d) a UAV keeps a UGV from its own task for a bounded time at most. Then the UGV is on its own "
+        "until it has rested. This holds whatever the UAV proposes, withdraws, says of its map or names as its cause, "
+        "and whatever a channel does to its messages."
     )
     latex: tuple[str, ...] = (
         r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h), \quad N \text{ tries}, \; "

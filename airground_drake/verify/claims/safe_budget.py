@@ -27,14 +27,14 @@ class SafeBudget(TheoremClaim):
     subject = "distance budget"
     summary = "The law adds what turning, lags, delays and errors of positions cost, so bodies keep the safe distance."
     statement = (
-        "Where the points that the law steers keep the law's distance d_law at the samples, the bodies of robots that "
-        "turn, lag, get their commands late or have a plant of the user's own keep the safe distance d at all times, "
-        "from a start at which they have it. Beside an obstacle that appears later, that is where a body that lags or "
-        "gets its commands late, and its way under commands already given, are clear (SAFE-HYP). So do the bodies of "
-        "robots that act on measured positions with bounded errors, as each inequality is met as measured, or both of "
-        "a pair stand, and those of UGVs that stand where they lack another one's message. "
-        "Beside an obstacle that may move, the bodies keep in the same way what SAFE-OWN states. For each kind of pair "
-        "d_law is at least what the theorems ask for."
+        "Suppose that the points that the law steers keep the law's distance d_law at the samples, and that the "
+        "bodies start at the safe distance d. Then the bodies keep d at all times: those of robots that turn, lag, "
+        "get their commands late or have a plant of the user's own, of robots that act on measured positions with "
+        "bounded errors, and of UGVs that stand where they lack another one's message. With measured positions, each "
+        "pair meets its inequality as measured, or both stand. When an obstacle appears, a body that lags or gets its "
+        "commands late must be clear of it, and so must its way under commands already given (SAFE-HYP). Beside an "
+        "obstacle that may move, the bodies keep what SAFE-OWN states. For each kind of pair d_law is at least what "
+        "the theorems ask for."
     )
     latex = (
         r"d_{\mathrm{law}} \ge b + \sum_{i} (c_i + f_i + w_i / A), \quad b = d + V |\delta_i - \delta_j| \text{ or } "
@@ -64,7 +64,7 @@ class SafeBudget(TheoremClaim):
         "That the steered points keep the law's distance (SAFE-INV does), or that a command was met in full: a "
         "shortened command recovers a distance at a smaller gain."
     )
-    theorems: tuple[str, ...] = ()
+    theorems: tuple[str, ...] = (*BASIC, *OF_ERRORS, *BESIDE_MOVING, "Plants", "Turning", "Mixed")
     margin_of = "distance in the law less what the plants take"
 
     def applies(self, scenario: Scenario) -> bool:

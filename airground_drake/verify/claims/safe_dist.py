@@ -35,13 +35,15 @@ class LeastDistances(Proof):
 
 class SafeDist(TheoremClaim):
     id = "SAFE-DIST"
-    summary = "Bounded velocity errors cost a bounded distance."
+    summary = "Bounded velocity errors cost a bounded distance, unless two robots stand for lack of messages."
     statement = (
         "If velocities are disturbed by at most w and A h <= 1, no distance falls below d - w/A (obstacle) or "
         "d - 2 w/A (two disturbed robots), as long as its own inequality is met at every sample. After N periods "
         "inside in a row the distance is at least d - (1 - (1 - A h)^N) W/A if it was d before, W = w or 2 w. "
         "A robot whose turning or wheel limit leaves the share s of a command meets it with the gain s A: all this "
         "then holds with s A for A, s the least share of the run. "
+        "Where messages between UGVs may be lost: while one of two UGVs stands for lack of a message, all this holds "
+        "with A/2 for A; a period in which both stand restores nothing, and can cost 2 w h more. "
         "With several points, each with D >= d - W/A, all inequalities can be met at once if there is a unit vector g "
         "with n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together. All this is "
         "about robots and bodies at rest. Beside an obstacle that may move with V the passive inequality restores "
@@ -81,6 +83,7 @@ class SafeDist(TheoremClaim):
 
     theorems = (
         "Budget.budget_always",
+        "Budget.one_stands",
         "Turning.shortened_gain",
         "Gate.deficit_closed_form",
         "Gate.common_direction",

@@ -16,12 +16,12 @@ class SafeGate(SafeInv):
     subject = "proof of distances"
     summary = "Under method (d) nothing that the UAV asks for makes a robot bring itself closer than the safe distance."
     statement = (
-        "Under method (d) no intervention, accepted or not, leaves the safe set. The avoidance layer comes last, and "
-        "from a safe state any command, scaled back far enough, meets every inequality; SAFE-INV does the rest. "
-        "Neither the optimiser nor its horizon, nor the UAV as an adviser is trusted; as a robot the UAV must keep its "
-        "own share of each inequality. No hypothesis is about messages between UAVs and UGVs: a channel may lose them "
-        "all. This is about robots and bodies at rest. Beside an obstacle that may move, "
-        "nothing that the UAV asks for makes a robot bring itself too near: v = 0 meets the passive inequality, too."
+        "Under method (d) no intervention, accepted or not, leads out of the safe set. The avoidance layer comes "
+        "last. From a safe state every command meets all inequalities if it is scaled back far enough; the rest is "
+        "SAFE-INV. The proof trusts neither the optimiser and its horizon nor the UAV's advice; as a robot, the UAV "
+        "must keep its own share of each inequality. It assumes nothing about messages between UAVs and UGVs: all of "
+        "them may be lost. This is about robots and bodies at rest. Beside an obstacle that may move, nothing that "
+        "the UAV asks for makes a robot bring itself too near: v = 0 meets the passive inequality, too."
     )
     latex = (
         r"b_k \le 0, \; 0 \le c \le \frac{b_k}{n_k^\top u} \text{ wherever } n_k^\top u < b_k \; \Rightarrow \; "
@@ -45,7 +45,7 @@ class SafeGate(SafeInv):
     )
 
     about_the_law = True
-    theorems = ("Gate.scaled_back", "Safety.standing", "Safety.safe_always", "Passive.own_doing")
+    theorems = ("Gate.scaled_back", "Gate.no_faster", "Safety.standing", "Safety.safe_always", "Passive.own_doing")
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         return {**super().inputs(scenario), "intervention_on_top": METHODS["d"].intervention_on_top}

@@ -176,6 +176,12 @@ class SafeHyp(TraceClaim):
         "was passive only that it did not bring itself nearer (SAFE-OWN)."
     )
 
+    theorems = (
+        "Safety.safe_always", "Safety.recovers", "Safety.unseen", "Safety.standing", "Safety.capped",
+        "Convex", "Budget", "Pieces", "Plants", "Turning", "Passive.own_doing", "Passive.kept", "Passive.since",
+        "Passive.restored", "Passive.held_off", "Mixed.drifting", "Mixed.unicycle_chord", "Mixed.lagging",
+        "Mixed.delayed", "Mixed.shares", "LawChecker.sound", "LawChecker.obeys_exactly",
+    )  # fmt: skip
     exercised_by = "avoidance inequalities that bound a command at a control sample"
 
     def check(self, trace: Trace) -> Finding:

@@ -21,12 +21,13 @@ class SafeOwn(TraceClaim):
     subject = "the robots' own doing"
     summary = "No robot itself brought a distance below the required one, whatever the obstacles that move did."
     statement = (
-        "In every control period, with the other body held where it was at the control sample, no robot came nearer to "
-        "it than min(D, d + V h): D is the distance at the sample, d the required one, V the speed at which the other "
-        "body is expected to move at most, 0 for robots and bodies at rest. What was lost besides, the other body "
-        "moved itself. Where a body is not where the law steers it, D is the distance of the steered points less what "
-        "the plants take, or that of the bodies if they are nearer already. Where the distance was broken, no robot's "
-        "body came nearer by its own motion than min(D, d), D that of the bodies: not by commands under way, either."
+        "In every control period, with the other body held where it was at the control sample, no robot came nearer "
+        "to it than min(D, d + V h). D is the distance at the sample, d the required one, and V the largest speed at "
+        "which the other body is expected to move (0 for robots and bodies at rest). Any further loss is the other "
+        "body's motion. Where a body is not where the law steers it, D is the distance of the steered points less "
+        "what the plants take, or the distance of the bodies if that is smaller already. Where the distance was "
+        "broken, no robot's body came nearer than min(D, d) by its own motion, including commands under way; there D "
+        "is the distance of the bodies."
     )
     latex = (
         r"\mathrm{dist}(p_i(t_k + s), C_j(t_k)) \ge \min(D_k, \, d_{ij} + V_j h) - 10^{-9} \text{ m}, \quad "
@@ -50,6 +51,7 @@ class SafeOwn(TraceClaim):
         "got out of its way. It says nothing about any other run."
     )
 
+    theorems = ("Passive.own_doing", "Passive.since", "Turning.shortened_obeys", "Plants.unicycle_stands")
     exercised_by = "control periods in which an obstacle that may move was within reach"
 
     def applies(self, trace: Trace) -> bool:

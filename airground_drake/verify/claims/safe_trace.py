@@ -36,13 +36,13 @@ class SafeTrace(TraceClaim):
     )
     method = (
         "Exact minimum of the distance of the bodies on every segment between two rows, in closed form: nothing is "
-        "sampled. A "
-        "straight motion is nearest to a convex core at an end, where it passes a corner or an edge at right angles, "
-        "or where it crosses the line of an edge; in a polygon, it is deepest where two edges are equally near. A "
-        "barrier is as near as the nearest of its convex parts. A body that turns or lags leaves the straight line: by "
-        "so much the distance is taken shorter, and where that may be too short, the segment is divided until it is "
-        "straight to 1e-10 m. Before that, each recorded step of a steered point must equal command times duration, "
-        "and each recorded body what its plant makes of that, to 1e-9 m; otherwise the verdict is `error`."
+        "sampled. A straight motion is nearest to a convex core at an end, where it passes a corner or an edge at "
+        "right angles, or where it crosses the line of an edge; in a polygon, it is deepest where two edges are "
+        "equally near. A barrier is as near as the nearest of its convex parts. A body that turns or lags leaves the "
+        "straight line. Its distance is reduced by that much; where the result may be too small, the segment is "
+        "divided until it is straight to 1e-10 m. First of all, each recorded step of a steered point must equal "
+        "command times duration, and each recorded body must follow by its plant, to 1e-9 m; otherwise the verdict is "
+        "`error`."
     )
     equations = "(7)-(8), (11)"
     assumptions = (

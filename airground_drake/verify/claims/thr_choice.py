@@ -59,7 +59,7 @@ class ThrChoice(ModelClaim):
     subject = "choice of the threshold"
     summary = "The threshold in force is the best one for the scenario's own numbers, or it is declared by the user."
     statement = (
-        "The threshold in force minimises the Bayes risk for the scenario's own c1, c2, drift and noise, or somebody "
+        "The threshold in force minimises the Bayes risk for the scenario's own c1, c2, drift and noise, or the user "
         "declared it: the rule `fixed` takes a number, the rule `printed` takes (19) as the paper prints it."
     )
     latex = (

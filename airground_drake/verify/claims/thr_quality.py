@@ -78,9 +78,8 @@ class ThrQuality(TraceClaim):
     subject = "timing of triggers"
     summary = "The UAV stepped in when the real task error, without noise, was about at the threshold."
     statement = (
-        "At every trigger, and while the UAV watched without one, the task error without noise agreed with the "
-        "threshold to within the width of the hysteresis: no trigger came at a smaller error, no larger error went "
-        "without a trigger."
+        "The task error without noise agreed with the threshold to within the width of the hysteresis: no trigger "
+        "came at a smaller error, and while the UAV watched, no larger error went without a trigger."
     )
     latex = (
         r"e(t) = \lVert \rho_{rd}(t) - \rho(t) \rVert, \quad w = \zeta - \zeta_{release} \quad "

@@ -40,7 +40,6 @@ VARIABLE_TOLERANCE_M = 1e-6
 MODES = {"trigger": 1, "release": 0, "refractory": 2, "resume": 0}
 
 # Why no crossing in a step is missed.
-THEOREMS = ("Isolation.largest_at_an_end", "Isolation.nowhere_below", "Isolation.attained")
 
 # Event that the trace has for a transition.
 EVENT_KINDS = {"trigger": "trigger", "release": "release", "refractory": "release"}
@@ -101,6 +100,7 @@ class ThrTrig(TraceClaim):
         "the theorems say nothing about other runs of the scenario."
     )
 
+    theorems = ("Isolation.largest_at_an_end", "Isolation.nowhere_below", "Isolation.attained")
     exercised_by = "transitions of the automaton that were due"
 
     def check(self, trace: Trace) -> Finding:
@@ -139,7 +139,7 @@ def isolation(noise_period_s: float, period_s: float, levels: TriggerLevels) -> 
         Hypothesis.of("noise periods beside control samples", says, -(steps % 1)),
         Hypothesis.of("control periods in a noise period", "there is at least one", steps - 1),
     ]
-    ground = grounds(THEOREMS, hypotheses)
+    ground = grounds(ThrTrig.theorems, hypotheses)
     return {"isolation": ground["reason"] or ground["proof"], "hypotheses": hypotheses}
 
 

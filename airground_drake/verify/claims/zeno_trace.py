@@ -27,6 +27,7 @@ class ZenoTrace(TraceClaim):
         "there is no gap: the claim holds with an empty margin."
     )
 
+    theorems = ("Trigger",)
     exercised_by = "gaps between consecutive triggers of one UGV"
 
     def check(self, trace: Trace) -> Finding:

@@ -194,7 +194,14 @@ Proof.
     split; [| intros _]; intros c Hc; rewrite E0; specialize (H c Hc); fold g in H; lra.
 Qed.
 
-(** ** At the samples the points that the law steers keep the law's distance, but for error and loss. *)
+(** THEOREM (7)-(8), (11): At every sample the points that the law steers keep its distance d_law, but for eps and W/A.
+    - The product of gain and control period, A h, is at most 1: min(A h, 1) stands for it (Safety.capped).
+    - At every sample the pair meets the law, up to a slack, with a relative position that is measured up to eps; or it
+      is far apart, or stands.
+    - W is at least the slacks and drifts of the two; dips and covers are what the plants have at most (Mixed).
+    - eps (1 - A h) <= A h (d_law - eps - W/A), and eps is below d_law - eps - W/A.
+    - The pair starts at d_law - eps - W/A or farther (Budget.measured_start).
+    Silent on: How fast a pair that starts nearer recovers: that is Safety.recovers. *)
 Theorem at_samples i j : apart i j -> holds i j (kept i j) (sample first) ->
   forall k, (first <= k)%nat -> sampled k -> holds i j (kept i j) (sample k).
 Proof.
@@ -248,7 +255,12 @@ Proof.
   unfold b in B; lra.
 Qed.
 
-(** ** The same for ever. *)
+(** THEOREM (7)-(8), (11): Pairs that meet the law, as measured and with the distance d_law, keep the true distance d at
+    all times.
+    - The hypotheses of Budget.at_samples.
+    - d_law is at least eps + W/A + sqrt((d + covers + dips)^2 + eps^2).
+    Silent on: Anything about sets that turn, or about a pair from a period on in which it misses the law by more than
+    W. *)
 Corollary budget_always i j d : first = 0%nat -> (forall k, sampled k) -> apart i j ->
   0 <= d + cover i + cover j + dip i + dip j -> needed i j d <= dlaw i j -> holds i j (kept i j) 0 ->
   forall t, 0 <= t -> clear (inside i j) d (sub (x i t) (x j t)).
@@ -258,7 +270,8 @@ Proof.
   - lia.
 Qed.
 
-(** A start at which the *measured* distance is [dlaw] is enough. *)
+(** THEOREM: A pair that is measured to be at d_law at the start has the distance from which the budget begins.
+    - Its relative position is measured with an error of eps at most. *)
 Lemma measured_start i j w t : apart i j -> norm (sub w (relative i j t)) <= err i j ->
   clear (inside i j) (dlaw i j) w ->
   holds i j (kept i j) t.
@@ -279,12 +292,14 @@ End Budget.
 Lemma halves B q q' e e' a b : q + q' = 1 -> q * B - e <= a -> q' * B - e' <= - b -> B - (e + e') <= a - b.
 Proof. intros Q Ha Hb; replace q with (1 - q') in Ha by lra; lra. Qed.
 
-(** What meets the law with some gain meets it with a smaller one: a pair takes the smaller one of its two. *)
+(** THEOREM: What meets the law with a gain meets it with a smaller one.
+    - The period is positive. *)
 Lemma smaller_gain h A A' d D : A' <= A -> bound h A' d D <= bound h A d D.
 Proof. intros HA; unfold bound; destruct (Rle_dec D d); [apply Rmult_le_compat_r; lra | lra]. Qed.
 
-(** One of two robots stands; the other one does its half with the gain [A]: together they meet the law with [A / 2].
-    So does a pair of which both do their halves ([smaller_gain]). *)
+(** So does a pair of which both do their halves ([smaller_gain]). *)
+(** THEOREM: Where one of two robots stands and the other does its half with a gain, they meet the law with half of it.
+    - The period is positive. *)
 Lemma one_stands h A d D b : 0 < h -> bound h A d D / 2 <= b -> bound h (A / 2) d D <= b.
 Proof.
   intros Hh M; apply Rle_trans with (2 := M); unfold bound; destruct (Rle_dec D d) as [| out]; [lra |].

@@ -69,7 +69,9 @@ Proof.
   rewrite X; replace (dot n (scale D n)) with (D * dot n n) by (vectors; ring); rewrite <- Q; lra.
 Qed.
 
-(** ** The signed distance is convex: wherever [x] is, [n] leads away. *)
+(** THEOREM: The signed distance to a convex set is convex, and the unit vector away from the set is a subgradient of
+    it.
+    - The signed distance is that from a nearest point, or inside minus the depth (Convex.signed_distance). *)
 Theorem leads_away x n : signed_distance -> deep x n \/ outside x n -> away gap x n.
 Proof.
   intros S H; apply behind in H; destruct H as [N B]; split; [exact N |]; intros z.
@@ -83,7 +85,8 @@ Proof.
     replace (dot n (sub y x)) with (dot n (sub z x) - dot n (sub z y)) in B by (vectors; ring); lra.
 Qed.
 
-(** ** Both ways to say that [x] is [m] or farther away. *)
+(** THEOREM: A signed distance of at least m > 0 is a distance of at least m from every point of the set.
+    - The signed distance is that from a nearest point, or inside minus the depth (Convex.signed_distance). *)
 Theorem clear_gap m x : signed_distance -> 0 < m -> (clear inside m x <-> m <= gap x).
 Proof.
   intros S M; destruct (S x) as [n H]; split.
@@ -99,11 +102,16 @@ End Signed.
 
 (** * Instances *)
 
-(** ** A ball of radius [r], a point if [r] is 0: [n] points away from its centre. *)
+(** THEOREM: The distance from a ball or point is convex, and the unit vector away from its centre is a subgradient of
+    it.
+    - The vector points away from the centre. *)
 Theorem ball r x n : along n x -> away (fun x => norm x - r) x n.
 Proof. intros Ha; split; [apply Ha | intros y; pose proof (grows n x y Ha); lra]. Qed.
 
-(** ** In a polygon or polyhedron the nearest edge's line or face, [(n, b)], is as deep as the largest ball is wide. *)
+(** THEOREM: Inside a polygon the unit vector away is normal to the nearest edge, whose line is as far as the set is
+    deep.
+    - The set is an intersection of half-planes or half-spaces.
+    - The point is in it. *)
 Theorem nearest_edge (edges : list (vec * R)) gap x n b :
   let inside c := forall m a, In (m, a) edges -> dot m c <= a in
   (forall m a, In (m, a) edges -> norm m = 1) -> In (n, b) edges -> gap x = dot n x - b ->
@@ -116,7 +124,9 @@ Proof.
     replace (dot m (add x e)) with (dot m x + dot m e) by (vectors; ring); lra.
 Qed.
 
-(** ** Outside any convex set, the point of the set at the least distance. *)
+(** THEOREM: Outside a convex set the unit vector away from it is the direction from its nearest point.
+    - The set is convex.
+    - No point of it is nearer, and the point is not in it. *)
 Theorem nearest_point (inside : vec -> Prop) x y :
   (forall a b l, inside a -> inside b -> 0 <= l <= 1 -> inside (add a (scale l (sub b a)))) ->
   inside y -> (forall c, inside c -> norm (sub x y) <= norm (sub x c)) -> 0 < norm (sub x y) ->

@@ -151,7 +151,10 @@ Proof.
   pose proof (Z.mul_div_le (- (a * unit r)) b B); lia.
 Qed.
 
-(** ** Soundness: two bodies that the checker accepts keep their distance at all times of the run. *)
+(** THEOREM (7)-(8), (11): Two bodies of a recorded run that the checker accepts keep their distance at all times of the
+    run.
+    - The integers in the file are the recorded positions, rounded to 2^-60 m.
+    - Between two rows bodies move on straight lines. *)
 Theorem sound r i j a b : well_formed r = true -> keeps r i j a b = true -> forall t, begins r <= t <= ends r ->
   IZR a / IZR b <= norm (sub (position r i t) (position r j t)).
 Proof.
@@ -289,7 +292,10 @@ Proof.
   all: cbn [separate_all] in H; split_ifs; subst; eauto.
 Qed.
 
-(** ** Soundness: a body that the checker accepts keeps its distance from all of the sets at all times of the run. *)
+(** THEOREM (7)-(8), (11): A body that the checker accepts keeps its distance from convex sets that move without
+    turning, at all times.
+    - The hypotheses of DistanceChecker.sound.
+    - The corners in the file are those of the scenario, rounded to 2^-60 m; the sets do not turn. *)
 Theorem sets_sound r i j sets a b proofs : well_formed r = true -> keeps_clear r i j sets a b proofs = true ->
   forall t, begins r <= t <= ends r -> clear r i j sets (IZR a / IZR b) t.
 Proof.

@@ -24,6 +24,7 @@ Proof.
     unfold p; rewrite at_time by lra; unfold excess; f_equal; simpl; field.
 Qed.
 
+(** THEOREM: A moving robot meets all hypotheses of Safety.safe_always: they do not contradict each other. *)
 Theorem can_be_met : forall t, 0 <= t -> 1 <= norm (sub (p true t) (p false t)).
 Proof.
   assert (P : forall k, 0 < excess k) by (intros k; apply pow_lt; lra).

@@ -3,8 +3,9 @@
 Require Import Reals Lra Psatz Safety.
 Local Open Scope R_scope.
 
-(** ** From a safe state any command that is scaled back far enough meets all inequalities.
-    In a safe state all bounds are at most 0; far enough is [c <= b i / r] wherever the rate [r] misses its bound. *)
+(** THEOREM (20): From a safe state any command that is scaled back far enough meets all inequalities.
+    - All bounds are at most 0 (a safe state).
+    - The factor c is at most bound/rate for every inequality that the command misses. *)
 Theorem scaled_back (k : Type) (n : k -> vec) (b : k -> R) v c :
   (forall i, b i <= 0) -> 0 <= c <= 1 ->
   (forall i, dot (n i) v < b i -> c <= b i / dot (n i) v) -> forall i, b i <= dot (n i) (scale c v).
@@ -15,8 +16,9 @@ Proof.
   apply M in L as Q; assert (E : b i / r * r = b i) by (field; lra); nra.
 Qed.
 
-(** ** The allowed velocity nearest to a command is no faster than it, where standing still is allowed.
-    [q] is the projection of [u] onto a convex set with 0 in it: that is all that the premise says. *)
+(** [q] is the projection of [u] onto a convex set with 0 in it: that is all that the premise says. *)
+(** THEOREM: Where standing still is allowed, the nearest allowed velocity is no faster than the one asked for.
+    - The velocity is the projection onto a convex set that contains 0. *)
 Theorem no_faster u q : dot (sub u q) (sub (V 0 0 0) q) <= 0 -> norm q <= norm u.
 Proof.
   intros H; apply sqrt_le_1_alt; pose proof (Rle_0_sqr (norm (sub u q))) as S; unfold Rsqr in S.
@@ -25,11 +27,15 @@ Qed.
 
 (** * SAFE-DIST *)
 
-(** ** What is missing of a safe distance after [k] disturbed periods, where [f] was missing at the start. *)
+(** THEOREM: After k disturbed periods inside the safe distance d - (e/A + (1 - A h)^k (f - e/A)) is left.
+    - A is positive.
+    - f is what was missing at the start. *)
 Theorem deficit_closed_form h A e f k : 0 < A -> deficit h A e f k = e / A + (1 - A * h) ^ k * (f - e / A).
 Proof. intros P; induction k as [| k IH]; simpl; [ring |]; rewrite IH; unfold missing; field; lra. Qed.
 
-(** ** All inequalities can be met at once, where one direction [g] leads away from every near point. *)
+(** THEOREM: If one direction leads away from every near point, one velocity meets all inequalities at once.
+    - Every distance is at least d - e/A.
+    - There is a unit vector g with n.g >= m > 0 for every near point. *)
 Theorem common_direction (k : Type) (n : k -> vec) (d D : k -> R) h A e m g : 0 < h -> 0 < A -> 0 <= e -> 0 < m ->
   norm g = 1 -> (forall i, norm (n i) = 1) -> (forall i, d i - e / A <= D i) ->
   (forall i, D i < d i + h * (e / m) -> m <= dot (n i) g) ->
@@ -49,8 +55,10 @@ Proof.
     destruct (Rlt_dec (D i) (d i + h * q)) as [L | L]; [apply C in L; nra | nra].
 Qed.
 
-(** ** Straight over a UGV, which cannot move along [n], the UAV's half of the inequality keeps [d - W / A] alone.
-    [r] is the radial speed, [W / 2] the disturbance of the UAV. *)
+(** [r] is the radial speed, [W / 2] the disturbance of the UAV. *)
+(** THEOREM: Straight over a UGV, which cannot move along n, the UAV's half of the inequality keeps d - W/A alone.
+    - A is positive, and A h is at most 1.
+    - The UAV is disturbed by at most W/2. *)
 Theorem overhead h A d D r W s : 0 <= s <= h -> 0 < A -> A * h <= 1 -> 0 <= W -> d - W / A <= D <= d ->
   A * (d - D) / 2 <= r -> d - W / A <= D + s * (r - W / 2).
 Proof.

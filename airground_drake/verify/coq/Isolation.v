@@ -6,7 +6,8 @@ Local Open Scope R_scope.
 (** The error moves from [a] to [b] on a straight line, the noise from [n0] to [n1]; [l] is the share of the step. *)
 Definition x a b n0 n1 l := norm (add (scale (1 - l) a) (scale l b)) + ((1 - l) * n0 + l * n1).
 
-(** ** No crossing from below is missed: it is nowhere above the larger of its ends. *)
+(** THEOREM (15), (20): Between two updates the decision variable is nowhere above the larger of its ends.
+    - Between two updates error and noise are linear in time. *)
 Theorem largest_at_an_end a b n0 n1 l : 0 <= l <= 1 -> x a b n0 n1 l <= Rmax (norm a + n0) (norm b + n1).
 Proof.
   intros H; unfold x; pose proof (triangle (scale (1 - l) a) (scale l b)) as T; rewrite !norm_scale in T by lra.
@@ -14,6 +15,10 @@ Proof.
 Qed.
 
 (** ** On the line, at [u] from its point nearest to 0, which is at [p] from 0, with noise [k u]: least is [p w]. *)
+(** THEOREM (15), (20): Between two updates the decision variable is nowhere below p w, p the distance of the error's
+    line from 0.
+    - Between two updates error and noise are linear in time.
+    - w^2 + k^2 = 1, k the rate of the noise. *)
 Theorem nowhere_below p u k w : w ^ 2 + k ^ 2 = 1 -> p * w <= sqrt (u ^ 2 + p ^ 2) + k * u.
 Proof.
   intros W; pose proof (proj2 (dot_le (V w (- k) 0) (V p u 0))) as C.
@@ -22,6 +27,9 @@ Proof.
   rewrite N in C; unfold dot in C; cbn -[pow] in C; lra.
 Qed.
 
+(** THEOREM (15), (20): The decision variable attains p w at one point of the line.
+    - The hypotheses of Isolation.nowhere_below.
+    - w is positive. *)
 Theorem attained p u k w : w ^ 2 + k ^ 2 = 1 -> 0 < w -> 0 <= p -> u = - p * k / w ->
   sqrt (u ^ 2 + p ^ 2) + k * u = p * w.
 Proof.

@@ -101,7 +101,8 @@ Proof.
   split; [lra | split; [intros _; lra |]]; apply Z.
 Qed.
 
-(** These are the positions of the run, with its times in seconds. *)
+(** THEOREM: On straight lines the places are the positions that the theorem about distances is about.
+    - The hypotheses of DistanceChecker.sound. *)
 Theorem straight_is r t : well_formed r = true -> begins r <= t <= ends r -> exists k s,
   (S k < length (times r))%nat /\ 0 <= s <= 1 /\
   forall i, has_rows r i = true -> position r i t = place (straight r i) (INR k + s).
@@ -173,7 +174,10 @@ Lemma row_in_metres r i j k : 0 < IZR (unit r) -> sub (row_at r i k) (row_at r j
   scale (/ IZR (unit r)) (real (minus (row (track_of r i) k) (row (track_of r j) k))).
 Proof. intros U; rewrite real_minus; unfold row_at, place_in, metres, real; apply vec_eq; vectors; field; lra. Qed.
 
-(** ** Soundness: what the checker accepts is an entry that was checked. [d] is kept of the law's distance. *)
+(** THEOREM (7)-(8), (11): Entries that the checker accepts were checked: the pair of points obeys the law in their
+    periods, up to e.
+    - The hypotheses of DistanceChecker.sound.
+    - The bodies are as recorded: no farther off the straight lines between the rows than is said of them. *)
 Theorem sound r i j bi bj num den a b e K N d : well_formed r = true -> obeys_law r i j num den a b e K N = true ->
   as_recorded r i bi -> as_recorded r j bj ->
   let n := Numbers (IZR num / IZR den) (IZR a / IZR b) 0 (metres r e) (metres r e) in
@@ -259,10 +263,16 @@ Definition off b := cover b + dip b.
 Definition recorded (r : run) (most : nat -> R) (b : nat -> body) := forall i, as_recorded r i (b i) /\ off (b i) <=
   most i.
 
+(** THEOREM: Bodies that move on the straight lines between the rows are recorded, and nothing is off.
+    - The hypotheses of DistanceChecker.sound. *)
 Lemma first_order_recorded r : recorded r (fun _ => 0) (straight r).
 Proof. intros i; split; [apply straight_recorded | unfold off; simpl; lra]. Qed.
 
-(** ** The same without error, in plain numbers: [l] is the distance of the law, and [d] what the bodies keep. *)
+(** [l] is the distance of the law, and [d] what the bodies keep. *)
+(** THEOREM (7)-(8), (11): Entries accepted without error were checked with e = 0, for the distance of the law and that of
+    the bodies.
+    - The hypotheses of LawChecker.sound.
+    - The distance of the law is at least what the bodies keep and are off. *)
 Corollary obeys_exactly r most bodies i j num den a b K N g l d : well_formed r = true ->
   obeys_law r i j num den a b 0 K N = true -> recorded r most bodies ->
   g = IZR num / IZR den -> l = IZR a / IZR b -> 0 <= d -> 0 < l -> d + most i + most j <= l ->

@@ -47,13 +47,16 @@ Proof.
   split; [apply near_itself; nra | split; [intros _; apply near_itself; nra | exact C]].
 Qed.
 
-(** First order: the body is the point that the law steers. *)
+(** THEOREM: A body that moves as commanded conforms to every drift, dip and cover.
+    - They are not negative. *)
 Lemma first_order b k :
   (forall s, 0 <= s <= h -> sub (steered b (sample k + s)) (steered b (sample k)) = scale s (command b k)) ->
   (forall t, place b t = steered b t) -> 0 <= drift b -> 0 <= dip b -> 0 <= cover b -> conforms b k.
 Proof. intros E P D1 D2 C; apply exactly; auto; intros s _; rewrite P; apply near_itself, C. Qed.
 
-(** The same with an error of velocity; or a set that moves as it likes, whose command is 0. *)
+(** THEOREM: A body whose velocity errs by w conforms to the drift w; and a set that moves at V, with the command 0, to
+    V.
+    - Dip and cover are not negative. *)
 Lemma drifting b k : (forall s, 0 <= s <= h ->
     norm (sub (sub (steered b (sample k + s)) (steered b (sample k))) (scale s (command b k))) <= drift b * s) ->
   (forall t, place b t = steered b t) -> 0 <= dip b -> 0 <= cover b -> conforms b k.
@@ -62,7 +65,11 @@ Proof.
   apply near_itself, C.
 Qed.
 
-(** A unicycle with chord steering; its centre is its axle. *)
+(** The centre of a unicycle is its axle. *)
+(** THEOREM: A unicycle with chord steering conforms to no drift, the cover l and the dip |omega| |(v, l omega)| h^2/8.
+    - Speed and turning rate are those of chord steering, and constant in a period.
+    - Positions do not jump, and have the plant's derivatives inside the periods.
+    Silent on: Slip: it may be declared as a drift of a user's plant. *)
 Lemma unicycle_chord b k th om v l a c : 0 < l -> chord_steering l h a c om v -> command b k = turn th a c ->
   goes (fun r => steered b (sample k + r)) (fun r => turn (th + om * r) v (l * om)) h ->
   (forall s, 0 <= s <= h -> steered b (sample k + s) = add (place b (sample k + s)) (turn (th + om * s) l 0)) ->
@@ -77,7 +84,10 @@ Proof.
       by (apply vec_eq; vectors; ring); rewrite norm_opposite; unfold q; rewrite norm_ahead; lra.
 Qed.
 
-(** First-order lag [tau], at speeds up to [top]. *)
+(** THEOREM: A body with lag conforms to no drift, no dip and the cover tau V.
+    - The velocity goes towards the command at the rate (u - v)/tau.
+    - It is no faster than V.
+    - Positions do not jump, and have the plant's derivatives inside the periods. *)
 Lemma lagging b k v tau top : 0 < tau -> (forall t, steered b t = add (place b t) (scale tau (v t))) ->
   goes (fun r => place b (sample k + r)) (fun r => v (sample k + r)) h ->
   goes (fun r => v (sample k + r)) (fun r => scale (/ tau) (sub (command b k) (v (sample k + r)))) h ->
@@ -95,6 +105,9 @@ Qed.
 (** Input delay [delta]: the law steers the point where the body will be when all commands on their way have been
     carried out. The entry may be about the places of bodies [wait] later, for a pair one of its delays: then equal
     delays cost nothing, and nor does a delay beside a set at rest. *)
+(** THEOREM: A body with a delay conforms to no drift, no dip and the cover V |wait - delay|, as it is `wait` later.
+    - The law steers the point where the body will be after the commands on their way.
+    - They are no faster than V. *)
 Lemma delayed b k p delta wait top :
   (forall s, 0 <= s <= h -> sub (steered b (sample k + s)) (steered b (sample k)) = scale s (command b k)) ->
   (forall t, p (t + delta) = steered b t) -> (forall t, place b t = p (t + wait)) ->
@@ -233,7 +246,9 @@ Qed.
 Lemma sum_plus f a K n : sum (fun q => a + f q) K n = INR n * a + sum f K n.
 Proof. induction n as [| n IH]; [simpl; ring |]; rewrite S_INR; simpl sum; rewrite IH; ring. Qed.
 
-(** ** An entry that was checked keeps its promise, and so does every entry of a table. *)
+(** THEOREM: An entry of a run's table that was checked keeps its promise, whatever is true of the others.
+    - Those of its kind: the law in its periods, the plants of its two bodies, and the numbers of its budget.
+    Silent on: Anything about a pair or a period that no entry is about. *)
 Theorem entry_keeps (c : entry) : checked c -> promise c.
 Proof.
   destruct c as [K N p]; unfold checked, promise; simpl.
@@ -299,12 +314,17 @@ Proof.
     rewrite (norm_sym (steered i (sample k + s))) in S; lra.
 Qed.
 
+(** THEOREM: If all entries of a table were checked, all of them keep their promises.
+    - The hypotheses of Mixed.entry_keeps. *)
 Corollary run_all (table : list entry) : Forall checked table -> Forall promise table.
 Proof. apply Forall_impl, entry_keeps. Qed.
 
 (** * Help with the hypotheses *)
 
-(** Each body takes its share of the law. *)
+(** THEOREM (7)-(8), (11): Two bodies that both meet their shares of the law meet it as a pair.
+    - The shares add up to 1.
+    - Both use the same measured positions.
+    Silent on: Anything about two robots with different measurements. *)
 Lemma shares i j inside n e e' q q' w y m k : norm (sub w (apart i j (sample k))) <= err n -> nearest inside w y m ->
   q + q' = 1 -> e + e' = short n -> q * bound h (gain n) (dlaw n) (norm (sub w y)) - e <= dot m (command i k) ->
   q' * bound h (gain n) (dlaw n) (norm (sub w y)) - e' <= - dot m (command j k) -> pair_law i j inside n k.
@@ -313,7 +333,8 @@ Proof.
   exact (halves _ q q' e e' _ _ Q Mi Mj).
 Qed.
 
-(** A body with lag that is at rest at the first sample is where the law steers it. *)
+(** THEOREM: Bodies with lag that are at rest at the first sample of their entry need no first distance of their own.
+    - b is not negative and at most m. *)
 Lemma from_rest i j mi mj inside m tau a K : 0 <= left m mi mj tau <= m -> velocity_of mi (sample K) = V 0 0 0 ->
   velocity_of mj (sample K) = V 0 0 0 -> clear inside m (sub (place (ahead i mi) (sample K)) (place (ahead j mj)
     (sample K))) ->
@@ -364,5 +385,6 @@ Proof.
     apply Rle_trans with (1 := Rmin_r _ _); vectors; lra.
 Qed.
 
+(** THEOREM: A robot that drives towards a point, and beside a person, meets the hypotheses: they can be met. *)
 Theorem drive_kept : Forall (promise 1) drive.
 Proof. apply run_all; [lra | exact drive_checked]. Qed.

@@ -72,7 +72,12 @@ Notation sample := (sample h).
 Definition relative k := sub (z (sample k)) (o (sample k)).
 Definition obeying k := lawful (r k) (relative k) (u k).
 
-(** ** Its own doing: had the set stood still since the sample, the robot would not have come below the limit. *)
+(** THEOREM: Had the set stood still since the sample, the robot would be at min(D, L) or farther, less drift, dip and
+    cover.
+    - In the period the robot moves away from the set at min(r, (L - D)/h) or faster; r is the speed of its retreat.
+    - r is not negative.
+    - Distances are signed distances to convex sets that do not turn, such as points, balls and polygons (Convex).
+    Silent on: That the robot keeps a distance: what is missing, the set has moved itself. *)
 Theorem own_doing k s w f cover : obeying k -> 0 <= s <= h ->
   norm (sub (sub (z (sample k + s)) (z (sample k))) (scale s (u k))) <= w * s + f ->
   norm (sub (x (sample k + s)) (z (sample k + s))) <= cover ->
@@ -95,7 +100,10 @@ Proof.
   replace (sub (sub (x t) (o (sample k))) _) with (sub (o t) (o (sample k))) in S by (vectors; f_equal; ring); exact S.
 Qed.
 
-(** ** A period that starts at the limit keeps [d], whatever the set does within its speed. *)
+(** THEOREM: A period that starts at L or farther keeps d, whatever the set does at Vo or slower.
+    - The hypotheses of Passive.own_doing.
+    - L is at least d + cover + dip + (w + Vo) h, w the drift of the robot.
+    Silent on: Anything about a period that starts nearer than L. *)
 Theorem kept k s d w f cover Vo : obeying k -> 0 <= s <= h -> 0 <= w -> 0 <= Vo ->
   norm (sub (sub (z (sample k + s)) (z (sample k))) (scale s (u k))) <= w * s + f ->
   norm (sub (x (sample k + s)) (z (sample k + s))) <= cover ->
@@ -137,6 +145,9 @@ Lemma sum_nonneg f K n : (forall k, 0 <= f k) -> 0 <= sum f K n.
 Proof. intros H; induction n; simpl; [lra |]; specialize (H (K + n)%nat); lra. Qed.
 
 (** ** With a retreat nothing is lost in a period in which it is as fast as what comes nearer, [b k]. *)
+(** THEOREM: A retreat that is as fast as what comes nearer in a period loses nothing in it.
+    - The hypotheses of Passive.own_doing.
+    - The distance starts at L, or nearer by at most what one period can take away. *)
 Theorem restored K n m W b : (forall k, (K <= k < K + n)%nat -> obeying k /\ off k <= b k <= W) ->
   m <= L - W -> m <= gap (relative K) ->
   m - sum (fun k => Rmax 0 (b k - h * r k)) K n <= gap (relative (K + n)).
@@ -151,6 +162,9 @@ Proof.
 Qed.
 
 (** ** A period in which the robot retreats as fast as the set approaches and as it drifts itself, [W]. *)
+(** THEOREM: While the robot retreats as fast as the set approaches, the distance falls by the dip at most.
+    - The hypotheses of Passive.own_doing.
+    - r is at least the speed of the set and the drift of the robot together. *)
 Theorem held_off k s m W f : obeying k -> 0 <= s <= h -> W <= r k -> m <= L - W * h -> m <= gap (relative k) ->
   norm (sub (sub (sub (z (sample k + s)) (o (sample k + s))) (relative k)) (scale s (u k))) <= W * s + f -> 0 <= W ->
   m - f <= gap (sub (z (sample k + s)) (o (sample k + s))).
@@ -166,6 +180,8 @@ Qed.
 
 (** ** From any sample on, what is lost below the limit is at most [b k] a period: the way of the set and the drift of
     the robot. *)
+(** THEOREM: Since any sample the distance has fallen below L by no more than the set's way and the robot's drift.
+    - The hypotheses of Passive.own_doing. *)
 Theorem since K n m b : (forall k, (K <= k < K + n)%nat -> obeying k /\ off k <= b k) -> m <= L ->
   m <= gap (relative K) -> m - sum b K n <= gap (relative (K + n)).
 Proof.
@@ -179,7 +195,8 @@ Qed.
 
 End Passive.
 
-(** ** Without a retreat errors add up: a robot told to stand that drifts by [w] towards a point loses [w] a second. *)
+(** THEOREM: Without a retreat errors add up: a robot told to stand that drifts towards a point loses all of its drift.
+    - The drift is not negative. *)
 Theorem loss_is_real h L m w : 0 < h -> 0 <= w -> exists (z o : R -> vec) (u : nat -> vec),
   (forall k, obeying h L 0 norm z o u (fun _ => 0) k) /\ (forall t, o t = o 0) /\
   (forall k s, 0 <= s -> norm (sub (sub (z (sample h k + s)) (z (sample h k))) (scale s (u k))) <= w * s) /\

@@ -55,6 +55,9 @@ Proof.
 Qed.
 
 (** ** Time executed since the last rest, the current try included *)
+(** THEOREM (20): Between two rests no UAV keeps a UGV from its own task longer than tries (longest + h).
+    - The gatekeeper is sampled every period h.
+    - It makes the transitions of the theorem's model. *)
 Theorem bounded w t c : run w t c ->
   c + (if executing w then t - since w else 0) <= INR most * (longest + h).
 Proof.
@@ -62,11 +65,15 @@ Proof.
   destruct (executing w); [destruct I as [_ [C [_ B]]] |]; nra.
 Qed.
 
-(** ** An accepted intervention is over in time *)
+(** THEOREM (20): An accepted intervention is over after `longest` and a sampling period at the latest.
+    - The hypotheses of Patience.bounded. *)
 Theorem over_in_time w t c : run w t c -> executing w = true -> t <= since w + longest + h.
 Proof. intros R E; apply holds in R; destruct R as [_ [_ I]]; rewrite E in I; tauto. Qed.
 
-(** ** Without news an accepted intervention is kept until its time is over, and not longer *)
+(** THEOREM (20): Unless a new obstacle is sensed, an accepted intervention is kept until its time is over, and not
+    longer.
+    - The UAV has not withdrawn it.
+    - The gatekeeper makes the transitions of the theorem's model. *)
 Theorem kept w t worth : executing w = true -> goes_on w t false worth = if Rle_dec (until w) t then stop w t else w.
 Proof. reflexivity. Qed.
 

@@ -118,8 +118,9 @@ Proof.
   apply M; [| lra | exact Hs]; intros r _; rewrite norm_0; lra.
 Qed.
 
-(** ** A motion that ends exactly where the command leads is off by [M s (h - s) / 2 <= M h^2 / 8] in between; [M]
-    bounds its acceleration. *)
+(** THEOREM: A motion that arrives where its command leads is off the straight line by at most M h^2/8 in between.
+    - M bounds its acceleration.
+    - Positions do not jump, and have the plant's derivatives inside the periods. *)
 Theorem leaves_chord p v u M h s : 0 <= s <= h -> 0 <= M -> goes p v h ->
   (forall r r', 0 <= r <= r' -> norm (sub (v r) (v r')) <= M * (r' - r)) -> sub (p h) (p 0) = scale h u ->
   norm (sub (sub (p s) (p 0)) (scale s u)) <= M * (s * (h - s)) / 2 /\ M * (s * (h - s)) / 2 <= M * (h * h) / 8.
@@ -201,8 +202,12 @@ Proof.
       replace y with x by ring end end; exact P.
 Qed.
 
-(** ** A point [p] moves towards [z], p' = (z - p) / tau, and stays within [a] of it. Where [z] keeps [m] from a set at
-    rest, [p] keeps [sqrt (m^2 - a^2)]: the square of its distance from each point of the set is pulled. *)
+(** The square of the distance of [p] from each point of the set is pulled. *)
+(** THEOREM: A point that is drawn after one that keeps m from a set at rest, within a of it, keeps sqrt(m^2 - a^2).
+    - It starts there.
+    - It moves straight towards the other one.
+    - Positions do not jump, and have the plant's derivatives inside the periods.
+    Silent on: Anything about sets that move. *)
 Theorem follows inside p z tau a m t : 0 < tau -> 0 <= m -> 0 <= t ->
   goes p (fun r => scale (/ tau) (sub (z r) (p r))) t -> (forall r, 0 < r < t -> norm (sub (z r) (p r)) <= a) ->
   (forall r, 0 < r < t -> clear inside m (z r)) ->

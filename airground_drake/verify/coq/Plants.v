@@ -137,6 +137,10 @@ Proof.
   f_equal; [| | ring]; rewrite HK; ring [CC].
 Qed.
 
+(** THEOREM: With chord steering the hand point of a unicycle arrives exactly where the command leads; its dip is known.
+    - Speed and turning rate are those of chord steering, and constant in a period.
+    - Positions do not jump, and have the plant's derivatives inside the periods.
+    Silent on: Slip, and errors of the heading. *)
 Theorem chord : sub (p h) (p 0) = scale h (turn th a b) /\
   forall s, 0 <= s <= h -> norm (sub (sub (p s) (p 0)) (scale s (turn th a b))) <= Rabs om * speed v (l * om) * (h *
     h) / 8.
@@ -150,7 +154,9 @@ Qed.
 
 End Chord.
 
-(** ** Told to stand, a unicycle neither turns nor drives. *)
+(** THEOREM: A unicycle that is told to stand neither turns nor drives.
+    - Speed and turning rate are those of chord steering, and constant in a period.
+    - Positions do not jump, and have the plant's derivatives inside the periods. *)
 Theorem unicycle_stands axle th om v l h : 0 < h -> chord_steering l h 0 0 om v ->
   goes axle (fun r => turn (th + om * r) v 0) h -> om = 0 /\ forall s, 0 <= s <= h -> axle s = axle 0.
 Proof.
@@ -199,6 +205,13 @@ Proof.
   intros k s Hk Hs; apply H; [exact Hk | exact Hs | apply Q; lia].
 Qed.
 
+(** THEOREM: The axle of a unicycle that never drives backwards keeps sqrt(m^2 - l^2) from sets that its hand point
+    keeps m from.
+    - It drives at v >= 0, a speed for each period.
+    - The set is at rest.
+    - It starts there.
+    - Positions do not jump, and have the plant's derivatives inside the periods.
+    Silent on: Anything about other robots, or about sets that move: there the cover l stays. *)
 Theorem forwards inside axle th v l m : 0 < l -> 0 <= m -> (forall k, (K <= k < K + N)%nat -> 0 <= v k /\
     goes (fun r => axle (sample k + r)) (fun r => turn (th (sample k + r)) (v k) 0) h) ->
   (forall k s, (K <= k < K + N)%nat -> 0 <= s <= h -> let t := sample k + s in
@@ -217,7 +230,10 @@ Qed.
 (** * First-order lag: the velocity [v] of a body goes towards its command, v' = (u - v) / tau. The law steers the point
     [p + tau v], where the body would come to rest. *)
 
-(** ** The point that the law steers moves exactly as commanded. *)
+(** THEOREM: The point p + tau v of a body with lag moves exactly as commanded.
+    - The velocity goes towards the command at the rate (u - v)/tau.
+    - Positions do not jump, and have the plant's derivatives inside the periods.
+    Silent on: What a wrong tau costs: that is a drift. *)
 Theorem lag p v u tau s : 0 < tau -> goes p v h -> goes v (fun r => scale (/ tau) (sub u (v r))) h -> 0 <= s <= h ->
   sub (add (p s) (scale tau (v s))) (add (p 0) (scale tau (v 0))) = scale s u.
 Proof.
@@ -230,7 +246,10 @@ Proof.
   destruct u, (v r); vectors; f_equal; field; lra.
 Qed.
 
-(** ** The speed stays within the limit of the commands. *)
+(** THEOREM: A body with lag is never faster than the limit of its commands.
+    - The velocity goes towards the command at the rate (u - v)/tau.
+    - Positions do not jump, and have the plant's derivatives inside the periods.
+    - It is no faster at the start. *)
 Theorem lag_speed v u tau top : 0 < tau ->
   (forall k, (K <= k < K + N)%nat ->
     goes (fun r => v (sample k + r)) (fun r => scale (/ tau) (sub (u k) (v (sample k + r)))) h) ->
@@ -255,6 +274,12 @@ Qed.
 
 (** ** Two bodies with lags [ti] and [tj], 0 for none. They are drawn after the points that the law steers; [tau] is of
     the reader's choice, [ti] or the larger of the two. A set at rest has no velocity. *)
+(** THEOREM: Where the points steered keep m, two bodies with lags keep sqrt(b^2 - (tau V_rel)^2), b = m - |tau_i - tau|
+    V_i - |tau_j - tau| V_j.
+    - tau is positive, of your choice, and b not negative.
+    - Speeds and relative speed are within their limits.
+    - They start there.
+    - Positions do not jump, and have the plant's derivatives inside the periods. *)
 Theorem lag_pair inside pi pj vi vj ti tj tau Vi Vj Vrel m : 0 < tau ->
   (forall k, (K <= k < K + N)%nat -> goes (fun r => pi (sample k + r)) (fun r => vi (sample k + r)) h /\
     goes (fun r => pj (sample k + r)) (fun r => vj (sample k + r)) h) ->
@@ -298,12 +323,16 @@ End Periods.
 
 (** * Input delay [delta]: the law steers the point [z] where the body [p] will be after all commands on their way. [wait]
     later the body is within what commands at [top] do in the difference of the two times. *)
+(** THEOREM: A body with a delay is, some time later, within V |wait - delay| of the point that the law steers.
+    - The law steers the point where the body will be after the commands on their way.
+    - They are no faster than V. *)
 Theorem delay (p z : R -> vec) delta wait top t : (forall r, p (r + delta) = z r) ->
   norm (sub (z (t + (wait - delta))) (z t)) <= top * Rabs (wait - delta) ->
   norm (sub (p (t + wait)) (z t)) <= top * Rabs (wait - delta).
 Proof. intros P H; replace (t + wait) with (t + (wait - delta) + delta) by ring; rewrite P; exact H. Qed.
 
-(** The bound of [lag_pair] is [d] or more if [b >= sqrt (d^2 + a^2)], with [a = tau Vrel]. *)
+(** THEOREM: The distance of Plants.lag_pair is d or more if b is at least sqrt(d^2 + (tau V_rel)^2).
+    - d is not negative. *)
 Lemma lag_needs d a b : 0 <= d -> sqrt (d ^ 2 + a ^ 2) <= b -> d <= sqrt (b * b - a * a).
 Proof.
   intros Hd Hb; assert (S : 0 <= d ^ 2 + a ^ 2) by nra; pose proof (sqrt_pos (d ^ 2 + a ^ 2));

@@ -311,7 +311,8 @@ Proof.
   split; [eapply Rle_trans; [apply F | exact A] | eapply Rle_trans; [exact C | apply F]]; assumption.
 Qed.
 
-(** ** Motions near those of the run: positions that were rounded, or motion that is not quite straight *)
+(** THEOREM: Positions within r and q of those of the run lose at most r + q of a distance.
+    - Recorded positions differ from the exported ones by their rounding. *)
 Theorem nearby (u v u' v' : vec) (r q d : R) : norm (sub u' u) <= r -> norm (sub v' v) <= q -> d <= norm (sub u v) ->
   d - r - q <= norm (sub u' v').
 Proof.

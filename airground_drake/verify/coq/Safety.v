@@ -123,7 +123,8 @@ Qed.
 (** [n] leads away: a unit vector along which the convex function [gap] grows at the rate 1, a subgradient of it. *)
 Definition away (gap : vec -> R) x n := norm n = 1 /\ forall y, gap x + dot n (sub y x) <= gap y.
 
-(** ** The lemma: after [s] on a straight line the distance is at least what it was plus [s] times its rate of change *)
+(** THEOREM: After a time s on a straight line a distance is at least what it was plus s times its rate of change.
+    - The distance is a convex function of the relative position, and n a unit subgradient of it. *)
 Theorem lemma gap x n v s : away gap x n -> gap x + s * dot n v <= gap (add x (scale s v)).
 Proof.
   intros [_ G]; specialize (G (add x (scale s v))).
@@ -144,6 +145,8 @@ Proof.
       assert (a = 0 /\ b = 0 /\ c = 0) as [-> [-> ->]] by nra; f_equal; ring.
 Qed.
 
+(** THEOREM: The lemma for the distance of two points in the plane.
+    - The two bodies are not at the same point. *)
 Corollary lemma_in_the_plane x1 x2 v1 v2 s : let D := sqrt (x1 * x1 + x2 * x2) in
   0 < D -> D + s * ((x1 * v1 + x2 * v2) / D) <= sqrt ((x1 + s * v1) * (x1 + s * v1) + (x2 + s * v2) * (x2 + s * v2)).
 Proof.
@@ -300,7 +303,14 @@ Proof.
   - apply from_the_first in Hk; rewrite next; apply between; auto; [lra | apply deficit_nonneg; lra].
 Qed.
 
-(** ** Recovery: a deficit shrinks by [1 - A h] a period, and does not grow within one. *)
+(** THEOREM (7)-(8), (11): What a pair lacks of its safe distance shrinks by the factor 1 - A h in each period and never
+    grows.
+    - The product of gain and control period, A h, is at most 1: min(A h, 1) stands for it (Safety.capped).
+    - The shares that the two robots of a pair take add up to 1.
+    - Between two samples every body moves on a straight line at its velocity, up to `wander`.
+    - A body that cannot leave the plane has no velocity out of it.
+    - At every sample each pair meets its two inequalities, or is too far apart to matter.
+    - Distances are signed distances to convex sets that do not turn, such as points, balls and polygons (Convex). *)
 Theorem recovers i j f : apart i j -> missed i j <= 0 -> 0 <= f -> d i j - f <= distance i j 0 ->
   forall k s, sampled k -> 0 <= s <= h -> d i j - (1 - A * h) ^ k * f <= distance i j (sample k + s).
 Proof.
@@ -331,24 +341,31 @@ Proof.
   destruct (Rlt_dec t (sample k)) as [L | L]; [apply IH, L | exists k, (t - sample k); lra].
 Qed.
 
-(** ** Safety for ever *)
+(** THEOREM (7)-(8), (11): Any number of bodies whose pairs start at their safe distances keep them at all times.
+    - The hypotheses of Safety.recovers.
+    - The pair starts at its safe distance or farther. *)
 Corollary safe_always i j : (forall k, sampled k) -> apart i j -> missed i j <= 0 -> d i j <= distance i j 0 ->
   forall t, 0 <= t -> d i j <= distance i j t.
 Proof. intros Hk Hij He H0 t Ht; destruct (periods t Ht) as [k [s [Hs ->]]]; apply safe; auto. Qed.
 
 (** * What meets the hypotheses *)
 
-(** An obstacle has velocity 0 and takes no share: it meets its inequality without slack. One that moves wanders at its
-    top speed; the robot then takes the slack [- wander j], so that [missed] is 0. *)
+(** An obstacle that moves wanders at its top speed; the robot then takes the slack [- wander j]: [missed] is 0. *)
+(** THEOREM (7), (11): A body that is held still and takes no share meets its inequality.
+    - The body has velocity 0, share 0 and slack 0. *)
 Lemma obstacle i j k n : v j k = V 0 0 0 -> share j i = 0 -> slack j i = 0 -> meets j i k n.
 Proof. intros E Q P; unfold meets; rewrite E, Q, P; vectors; lra. Qed.
 
-(** What is beyond the sensing range [r >= d + c h] is far, [c] being the sum of the speed limits. *)
+(** THEOREM: A pair farther apart than the sensing range needs no inequality until the next sample.
+    - The sensing range is at least d + c h.
+    - c is at least the sum of the two speeds. *)
 Lemma unseen i j k r c : norm (v i k) + wander i + norm (v j k) + wander j <= c -> d i j + c * h <= r ->
   r <= distance i j (sample k) -> far i j k.
 Proof. intros C Hr Hd; unfold far; nra. Qed.
 
-(** Outside the safe distance, standing still is always allowed. *)
+(** THEOREM: At its safe distance or farther a body that stands still meets its inequality.
+    - A h is at most 1.
+    - The share is not negative. *)
 Lemma standing i j k n : v i k = V 0 0 0 -> 0 <= share i j -> 0 <= slack i j ->
   d i j <= distance i j (sample k) -> meets i j k n.
 Proof.
@@ -361,9 +378,9 @@ Qed.
 
 End Law.
 
-(** ** A gain with [A h > 1] asks for more than [1 / h] does, so that the theorems cover it with [min (A, 1 / h)]: then
-    [A h] becomes [min (A h, 1)]. The program multiplies in floating point, where [A h] may come out above 1 by
-    rounding. *)
+(** The program multiplies in floating point, where [A h] may come out above 1 by rounding. *)
+(** THEOREM: A gain with A h > 1 asks for more than min(A, 1/h), so that the theorems cover it with min(A h, 1).
+    - h is positive. *)
 Theorem capped h A d D : 0 < h ->
   Rmin A (/ h) * h <= 1 /\ bound h (Rmin A (/ h)) d D <= bound h A d D.
 Proof.

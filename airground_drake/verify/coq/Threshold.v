@@ -37,7 +37,8 @@ Proof.
     by (unfold scale, u; field; lra); unfold scale; field; lra.
 Qed.
 
-(** ** The left side increases strictly. *)
+(** THEOREM (19): The left side of the threshold equation increases strictly.
+    - drift, noise, c1 and c2 are positive. *)
 Theorem increasing a b : a < b -> left_side a < left_side b.
 Proof.
   intros H; rewrite !left_u; destruct positive as [Q [K _]]; apply Rmult_lt_compat_l; [exact K |].
@@ -51,12 +52,16 @@ Proof.
     apply increasing in L; lra.
 Qed.
 
-(** ** Signs at two points enclose the root. *)
+(** THEOREM (19): Two points at which the equation has different signs enclose its root.
+    - drift, noise, c1 and c2 are positive.
+    - The left side is below c2/c1 at the lower point and above it at the upper one. *)
 Theorem enclosed low high zeta : left_side low < c2 / c1 < left_side high -> solves zeta -> low < zeta < high.
 Proof.
   unfold solves; intros [L H] E; split; apply Rnot_le_lt; intros [C | C]; try subst; try apply increasing in C; lra.
 Qed.
 
+(** THEOREM (19): The threshold equation with c2/c1 on the right has exactly one root, and it is positive.
+    - drift, noise, c1 and c2 are positive. *)
 Theorem exactly_one : exists zeta, 0 < zeta /\ solves zeta /\ forall other, solves other -> other = zeta.
 Proof.
   set (f := fun z => left_side z - c2 / c1); destruct positive as [Q [K P]].
@@ -97,7 +102,10 @@ Proof.
   rewrite B, E4, C2; unfold t; field; lra.
 Qed.
 
-(** ** The Bayes risk is least there, and nowhere else: no derivatives, only [1 + t < exp t]. *)
+(** No derivatives, only [1 + t < exp t]. *)
+(** THEOREM (16)-(19): The Bayes risk is strictly least at the root.
+    - drift, noise, c1 and c2 are positive.
+    - There is no initial deviation. *)
 Theorem least zeta other : solves zeta -> other <> zeta -> risk zeta < risk other.
 Proof.
   intros S N; pose proof (risk_difference zeta other S) as D; cbv zeta in D; destruct positive as [Q [K _]].
@@ -109,7 +117,9 @@ Proof.
   apply Rplus_lt_0_compat; [apply Rmult_lt_0_compat |]; lra.
 Qed.
 
-(** ** The printed equation, with c1/c2, has its root elsewhere, at a higher risk. *)
+(** THEOREM (19): The root of the printed equation, with c1/c2, has a higher risk.
+    - drift, noise, c1 and c2 are positive.
+    - c1 and c2 differ. *)
 Corollary printed_is_worse zeta printed : solves zeta -> left_side printed = c1 / c2 -> c1 <> c2 ->
   risk zeta < risk printed.
 Proof.
@@ -178,6 +188,9 @@ Proof.
     by (field; lra); nra.
 Qed.
 
+(** THEOREM (17)-(19): With any initial deviation the risk is lower at some other threshold than at the root.
+    - drift, noise, c1 and c2 are positive.
+    - The deviation is not 0 and smaller than the root. *)
 Theorem not_least_with_deviation y zeta : solves zeta -> y <> 0 -> Rabs y < zeta ->
   exists other, Rabs y < other /\ risk_from y other < risk_from y zeta.
 Proof.
@@ -257,6 +270,8 @@ Proof.
   pose proof (sinh_increasing x y ltac:(lra)); unfold f'' in X, Y; lra.
 Qed.
 
+(** THEOREM (19): One threshold is the root of the equation for at most two drifts.
+    - noise and threshold are positive. *)
 Theorem at_most_two_drifts noise c1 c2 zeta m1 m2 m3 : 0 < noise -> 0 < zeta -> 0 < m1 -> m1 < m2 -> m2 < m3 ->
   solves m1 noise c1 c2 zeta -> solves m2 noise c1 c2 zeta -> solves m3 noise c1 c2 zeta -> False.
 Proof.

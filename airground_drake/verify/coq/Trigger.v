@@ -66,7 +66,9 @@ Proof.
       repeat split; auto; try discriminate; intros; try (specialize (Hs eq_refl)); try lra.
 Qed.
 
-(** ** Neighbouring triggers, hence any two, are at least the dwell apart. *)
+(** THEOREM (20): Triggers i < j of a UGV are at least (j - i) dwell times apart, whatever the decision variable does.
+    - Time does not run backwards.
+    - The automaton makes the transitions of the theorem's model. *)
 Theorem dwell_apart s t l : run s t l -> forall i j, (i < j < length l)%nat ->
   nth j l 0 + INR (j - i) * dwell <= nth i l 0.
 Proof.
@@ -91,7 +93,9 @@ Proof.
   - pose proof (dwell_apart s t l R i j ltac:(lia)); lra.
 Qed.
 
-(** ** In a time [T] there are at most [floor (T / dwell) + 1] triggers. *)
+(** THEOREM (20): In a time T there are at most floor(T/dwell) + 1 triggers.
+    - The dwell time is positive.
+    - The hypotheses of Trigger.dwell_apart. *)
 Corollary at_most s t l T : 0 < dwell -> run s t l -> forall i m, (i + m < length l)%nat ->
   nth i l 0 - nth (i + m) l 0 <= T -> (Z.of_nat (S m) <= Int_part (T / dwell) + 1)%Z.
 Proof.

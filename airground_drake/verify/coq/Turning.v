@@ -64,7 +64,12 @@ Qed.
 Lemma turn_scale r th : turn th (r * a) (r * b) = scale r (turn th a b).
 Proof. unfold turn, scale; simpl; f_equal; ring. Qed.
 
-(** ** It turns at [W] at most, and arrives exactly where the shortened command leads. *)
+(** THEOREM: A command that is shortened as far as the turning limit asks for is followed exactly, within the limit.
+    - The hand point is ahead of the axle.
+    - The limit is less than half a turn per period.
+    - Speed and turning rate are those of chord steering, and constant in a period.
+    - Positions do not jump, and have the plant's derivatives inside the periods.
+    Silent on: Limits of wheel speeds: those shorten a command further. *)
 Theorem shortened_chord p th om v : chord_steering l h (s * a) (s * b) om v ->
   goes p (fun r => turn (th + om * r) v (l * om)) h ->
   Rabs om <= W /\ sub (p h) (p 0) = scale h (scale s (turn th a b)) /\
@@ -76,7 +81,9 @@ Proof.
   exact turns_within.
 Qed.
 
-(** ** There is such a steering for every command. *)
+(** THEOREM: There is a chord steering for every command that was shortened like that.
+    - The hand point is ahead of the axle.
+    - The limit is less than half a turn per period. *)
 Theorem steering_exists : exists om v, chord_steering l h (s * a) (s * b) om v.
 Proof.
   set (be := atan (s * b * h / (2 * l + s * a * h))).
@@ -98,7 +105,8 @@ Qed.
 
 End Turning.
 
-(** A limit of half a turn per period, or more, limits nothing. *)
+(** THEOREM: A limit of half a turn per period or more never binds.
+    - The period is positive. *)
 Lemma no_limit h W x : 0 < h -> PI <= W * h -> Rabs (2 * atan x / h) <= W.
 Proof.
   intros Hh HW; replace (2 * atan x / h) with (atan x * (2 / h)) by (field; lra).
@@ -110,6 +118,9 @@ Proof.
 Qed.
 
 (** ** A hand point at [l >= V0 h / (2 sin (W h / 2))] never needs a shortened command at the speed [V0]. *)
+(** THEOREM: At speeds up to V chord steering turns at (2/h) asin(V h/(2 l)) at most.
+    - V h is at most 2 l.
+    - 2 l + a h is positive, a the command ahead. *)
 Theorem chord_turns l h a b V0 : 0 < l -> 0 < h -> 0 < 2 * l + a * h -> speed a b <= V0 -> V0 * h <= 2 * l ->
   Rabs (2 * atan (b * h / (2 * l + a * h)) / h) <= 2 / h * asin (V0 * h / (2 * l)).
 Proof.
@@ -140,8 +151,12 @@ Proof.
   unfold Rabs; destruct Rcase_abs; lra.
 Qed.
 
-(** ** A car: its front wheels steer, so that it turns at a radius of [rho] at least. It follows every command of the cone
-    [rho |b| <= l a]: then [rho |omega| <= v]. So it never drives backwards, and it cannot turn on the spot. *)
+(** Its front wheels steer. In the cone [rho |omega| <= v]: it never drives backwards, and cannot turn on the spot. *)
+(** THEOREM: With chord steering a car follows every command of the cone R |b| <= l a at a radius of R at least.
+    - The hand point is ahead of the axle.
+    - The command leads ahead: a is not negative.
+    - Speed and turning rate are those of chord steering, and constant in a period.
+    Silent on: That a car gets anywhere: it stands where no command of the cone is allowed. *)
 Theorem car l h a b om v rho : 0 < l -> 0 < h -> 0 <= a -> 0 <= rho -> rho * Rabs b <= l * a ->
   chord_steering l h a b om v -> rho * Rabs om <= v.
 Proof.
@@ -187,11 +202,14 @@ Section Shortened.
 Variables (s : R) (u : vec).
 Hypothesis s_bounds : 0 < s <= 1.
 
+(** THEOREM: A shortened command still meets every inequality that v = 0 meets.
+    - The share that is left is above 0 and at most 1. *)
 Theorem shortened n bd : bd <= 0 -> bd <= dot n u -> bd <= dot n (scale s u).
 Proof. intros Hb H; replace (dot n (scale s u)) with (s * dot n u) by (vectors; ring); nra. Qed.
 
-(** ** Inside the distance of the law it is met with the gain [s A]. The pair takes the smaller gain of its two robots
-    ([smaller_gain] in Budget.v). *)
+(** The pair takes the smaller gain of its two robots ([smaller_gain] in Budget.v). *)
+(** THEOREM: Inside the distance of the law a command shortened to the share s meets the law with the gain s A.
+    - The share that is left is above 0 and at most 1. *)
 Theorem shortened_gain h A d D q n : 0 < h -> 0 <= A -> 0 <= q -> q * bound h A d D <= dot n u ->
   q * bound h (s * A) d D <= dot n (scale s u).
 Proof.
@@ -205,6 +223,9 @@ Qed.
 
 (** ** Beside an obstacle that moves the law stays met, but for the retreat. A retreat at [r] that the law asks for in
     full becomes one at [s r]. *)
+(** THEOREM: Beside an obstacle that moves a shortened command still obeys, and a retreat at r becomes one at s r.
+    - The share that is left is above 0 and at most 1.
+    Silent on: A retreat that was not asked for in full: of that only r = 0 is left. *)
 Theorem shortened_obeys h L gap r x : obeys h L gap r x u ->
   obeys h L gap 0 x (scale s u) /\ (r <= (L - gap x) / h -> obeys h L gap (s * r) x (scale s u)).
 Proof.

@@ -59,7 +59,6 @@ class TheoremClaim(ModelClaim):
     the claim open, unless `counterexample` shows that the claim is false.
     """
 
-    theorems: tuple[str, ...]  # names in `airground_drake.verify.proofs.THEOREMS`
     margin_of: str  # name of the hypothesis whose margin is the claim's
     exercised_by = "hypotheses that were checked"
 

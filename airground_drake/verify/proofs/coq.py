@@ -10,8 +10,8 @@ from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, one_line
-from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, RECORD, closure, digest, file_of, read_record
-from airground_drake.verify.proofs.theorems import THEOREMS
+from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, RECORD, closure, digest, file_of, read_record
+from airground_drake.verify.proofs.theorems import FOLDER, THEOREMS
 
 LIMIT_S = 600.0  # Wall-clock time for one call of Coq, s. The longest, `coqchk`, takes some 30 s.
 # Words with which a file could assume what it should prove, or turn off Coq's own checks.
@@ -117,7 +117,7 @@ def check_again(modules: Sequence[str], folder: Path, limit_s: float = LIMIT_S) 
     parts = dict(re.findall(r"^\* ([^:]+):\s*(.*?)\s*(?=^\*|\Z)", summary, re.MULTILINE | re.DOTALL))
     axioms = parts.pop("Axioms", None)
     if axioms is None or parts.pop("Theory", "") != "Set is predicative" or len(parts) != 3:
-        raise CoqError("coqchk does not say what the theories rest on")
+        raise CoqError("coqchk printed no list of what the theories rest on")
     for part, answer in parts.items():
         if answer != "<none>":
             raise CoqError(f"coqchk: {part}: {answer}")

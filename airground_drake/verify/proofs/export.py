@@ -28,8 +28,8 @@ from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.pair_kinds import MOVING, apart
 from airground_drake.verify.proofs.coq import without_comments
-from airground_drake.verify.proofs.record import FOLDER
 from airground_drake.verify.proofs.separating import Prism, Vector, root_up, separating
+from airground_drake.verify.proofs.theorems import FOLDER
 
 # A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
 # bound of an arc that is not attained, by far more.

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.verify.proofs.theorems import THEOREMS
+from airground_drake.verify.proofs.theorems import FOLDER, THEOREMS
 
-FOLDER = Path(__file__).parent.parent / "coq"  # where the theories and their record are
 RECORD = "record.json"
 
 # Axioms of Coq's real numbers, and of classical logic: a theorem may rest on these alone.

@@ -10,6 +10,7 @@ from typing import Any
 
 from airground_drake.base import files
 from airground_drake.base.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base.registry import DISTANCES
 from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.sim.trace import Trace, load
 from airground_drake.verify.proofs import coq, readback
@@ -22,8 +23,9 @@ from airground_drake.verify.proofs.export import (
     refuse_unknown,
     without_vectors,
 )
-from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, closure, digest
+from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, closure, digest
 from airground_drake.verify.proofs.table import Entry, Missed, TooNear, entries, law_file, lawful, missed, too_near
+from airground_drake.verify.proofs.theorems import FOLDER
 
 SCHEMA = "airground_drake.proofs/1"
 PLACE = "proofs"  # folder of a report for what is proved about it
@@ -31,6 +33,11 @@ FOUND = "proofs.json"  # file in that folder with the results
 # Part of Coq's message if a checker has computed `false` where the proof says `true`.
 COMPUTED = "is expected to have type"
 CHECKERS = ("DistanceChecker.v", "LawChecker.v")
+# Theorems and theories whose hypotheses the files of a run meet.
+THEOREMS = (
+    "DistanceChecker", "LawChecker", "Run", "Mixed.first_order", "Mixed.entry_keeps", "Mixed.run_all",
+    "Mixed.from_rest",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -183,8 +190,8 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
 
 
 def expects_kept(run: Trace) -> bool:
-    """Whether the scenario expects that the run keeps its distances: SAFE-TRACE is promised, and not to be refuted."""
-    expected = run.scenario.runs[run.run].expected.get("SAFE-TRACE", "holds")
+    """Whether the scenario expects that the run keeps its distances: the claim is promised, and not to be refuted."""
+    expected = run.scenario.runs[run.run].expected.get(DISTANCES, "holds")
     return declared(expected) != NOTHING and "refuted" not in expected
 
 

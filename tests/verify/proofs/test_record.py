@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from airground_drake.base.registry import MODEL_CLAIMS, RUN_CLAIMS
-from airground_drake.verify.proofs import THEOREMS, standing
-from airground_drake.verify.proofs.record import FOLDER, read_record
+from airground_drake.verify.claim import Claim
+from airground_drake.verify.proofs import THEOREMS, runs, standing
+from airground_drake.verify.proofs.record import FOLDER, file_of, read_record
 
 
 @pytest.fixture
@@ -70,16 +71,23 @@ def test_what_is_not_in_the_record_is_not_checked(copy: Path, edit: Callable[[Pa
 
 
 def test_an_unknown_theorem_is_refused_with_those_that_there_are() -> None:
-    with pytest.raises(ValueError, match=r"no theorem 'Safety.always'; there are Safety.lemma, "):
+    with pytest.raises(ValueError, match=r"no theorem 'Safety.always'; there are Budget.at_samples, "):
         standing("Safety.always")
 
 
-def test_hypotheses_are_checked_by_claims_that_there_are() -> None:
-    claims = {*MODEL_CLAIMS.own, *RUN_CLAIMS.own}
-    for theorem in THEOREMS.values():
-        assert all(where in claims or where.startswith("airground ") for where in theorem.checked_where), theorem.name
-        assert bool(theorem.checked_where) == bool(theorem.hypotheses), theorem.name
+def test_all_hypotheses_are_checked_somewhere() -> None:
+    claims = [registry.load(name, of=Claim) for registry in (MODEL_CLAIMS, RUN_CLAIMS) for name in registry.own]
+    checked = {*runs.THEOREMS, *(name for claim in claims for name in claim.theorems)}
+    theories = {name: file_of(name).removesuffix(".v") for name in THEOREMS}
+    assert checked <= {*THEOREMS, *theories.values()}
+    for name, theorem in THEOREMS.items():
+        assert not theorem.hypotheses or {name, theories[name]} & checked, name
         assert theorem.statement.endswith(".")
+
+
+def test_every_comment_about_a_theorem_is_read() -> None:
+    comments = sum(file.read_text(encoding="utf-8").count("(** THEOREM") for file in FOLDER.glob("*.v"))
+    assert comments == len(THEOREMS)
 
 
 def test_the_standing_of_theorems_needs_neither_drake_nor_numpy() -> None:
