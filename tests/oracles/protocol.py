@@ -258,8 +258,8 @@ def _missed(trace: Trace, sent: ProposalRecord, now: float) -> bool:
         or next_s < sent.issued_s + retry_s(trace) - TIME_TOLERANCE_S
     ):
         return False
-    last = heard(trace, sent.ugv, now)
-    if next_s + channel.delay_s <= sent.times_s[0] + LATE_S + TIME_TOLERANCE_S or (last and last["about"] == sent.number):
+    last, begins = heard(trace, sent.ugv, now), sent.times_s[0]
+    if next_s + channel.delay_s <= begins + LATE_S + TIME_TOLERANCE_S or (last and last["about"] == sent.number):
         return False
     k = int(np.abs(trace.sampled("t_s") - now).argmin())
     seen = trace.scenario.sensing is not None
