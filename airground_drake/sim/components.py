@@ -78,7 +78,9 @@ def repeats_after(scenario: Scenario) -> float:
     if scenario.channel is None:
         return np.inf
     down, up = make_qualities(scenario.channel)
-    answering = max(ANSWERING_S, scenario.gatekeeper.period_s + 2.0 * scenario.control.period_s)
+    # so an answer in time is read a planning period before: then the planner asks whether a copy would come too late
+    samples = scenario.gatekeeper.period_s, scenario.control.period_s, scenario.intervention.period_s
+    answering = max(ANSWERING_S, sum(samples))
     return down.delay_s + up.delay_s + max(down.jitter_s, up.jitter_s) + answering
 
 

@@ -347,15 +347,16 @@ class Planner:
         return after
 
     def _is_late(self, proposal: Proposal, ugv: str, t: float, place: Array) -> bool:
-        """Whether a proposal without an answer would come too late if it was repeated: its UGV is at a place, m."""
-        # A part of a joint plan is never late: the other UGVs have theirs. A UGV that is nearer to where the motion is
-        # than to where it began has read the proposal, and its answer is late or lost.
-        began, motion = float(proposal.motion.times[0]), proposal.motion
-        if proposal.party or proposal.cause not in ("", ugv) or t < proposal.issued + self.retry - SAME_S:
+        """Whether a copy of a proposal without an answer would come too late: its UGV is at a place, m."""
+        # A copy may leave up to the next planning instant. A part of a joint plan is never late: the other UGVs have
+        # theirs. A UGV that is nearer to where the motion is than to where it began has read the proposal, and its
+        # answer is late or lost.
+        began, motion, leaves = float(proposal.motion.times[0]), proposal.motion, t + self.period
+        if proposal.party or proposal.cause not in ("", ugv) or leaves < proposal.issued + self.retry - SAME_S:
             return False
         first, now = motion.sample(np.array([began, t]))
         nearer = np.linalg.norm(place - first) < np.linalg.norm(place - now)
-        return bool(nearer) and t + self.lead > began + LATE_S + SAME_S
+        return bool(nearer) and leaves + self.lead > began + LATE_S + SAME_S
 
     def _team(
         self,

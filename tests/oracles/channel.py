@@ -98,8 +98,8 @@ def _carried_otherwise(trace: Trace) -> Iterator[Fault]:
 
 def retry_s(trace: Trace) -> float:
     """After how long a message is sent again."""
-    ways, control = _ways(trace), trace.scenario.control.period_s
-    answering = max(0.15, trace.scenario.gatekeeper.period_s + 2.0 * control)
+    ways, given = _ways(trace), trace.scenario
+    answering = max(0.15, given.gatekeeper.period_s + given.control.period_s + given.intervention.period_s)
     return sum(way["delay_s"] for way in ways.values()) + max(way["jitter_s"] for way in ways.values()) + answering
 
 

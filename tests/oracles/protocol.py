@@ -250,16 +250,16 @@ LATE_S = 0.5
 
 def _missed(trace: Trace, sent: ProposalRecord, now: float) -> bool:
     """Whether a proposal that stands alone is too late to be repeated: no answer, and its UGV is still at its start."""
-    channel = trace.scenario.channel
+    channel, next_s = trace.scenario.channel, now + trace.scenario.intervention.period_s
     if (
         channel is None
         or sent.party
         or sent.cause != sent.ugv
-        or now < sent.issued_s + retry_s(trace) - TIME_TOLERANCE_S
+        or next_s < sent.issued_s + retry_s(trace) - TIME_TOLERANCE_S
     ):
         return False
-    last = heard(trace, sent.ugv, now)
-    if now + channel.delay_s <= sent.times_s[0] + LATE_S + TIME_TOLERANCE_S or (last and last["about"] == sent.number):
+    last, begins = heard(trace, sent.ugv, now), sent.times_s[0]
+    if next_s + channel.delay_s <= begins + LATE_S + TIME_TOLERANCE_S or (last and last["about"] == sent.number):
         return False
     k = int(np.abs(trace.sampled("t_s") - now).argmin())
     seen = trace.scenario.sensing is not None

@@ -124,6 +124,16 @@ def test_a_motion_begins_when_it_can_have_arrived() -> None:
         assert times[0] == pytest.approx(issued_s + 0.65)
 
 
+def test_no_copy_leaves_in_the_instant_in_which_its_proposal_is_planned_anew() -> None:
+    trace = over(Channel(0.3, loss=0.5), "case_b", "d")
+    sent = trace.messages
+    again, gone = sent[(sent["kind"] == "proposal") & (sent["attempt"] > 0)], sent[sent["kind"] == "withdrawal"]
+    assert len(again) > 1
+    assert len(gone) > 9
+    assert again.merge(gone, on=["about", "sent_s"]).empty
+    assert not faults_of(trace)
+
+
 def never(box: Any, *_: Any) -> Any:
     return box
 

@@ -143,9 +143,9 @@ def drive(start_s: float) -> Motion:
 
 
 @pytest.mark.parametrize(("t", "place", "answer", "anew"), [
-    (2.0, 0.0, SILENT, True), (2.0, 0.0, ACCEPT, False),
-    (1.9, 0.0, SILENT, False),  # it would not be repeated yet
-    (2.0, 0.5, SILENT, False),  # it is on its way
+    (1.9, 0.0, SILENT, True), (1.9, 0.0, ACCEPT, False),  # a copy would leave at 2.0
+    (1.8, 0.0, SILENT, False),  # none leaves before it is asked again
+    (1.9, 0.5, SILENT, False),  # it is on its way
 ])  # fmt: skip
 def test_a_proposal_that_its_ugv_missed_is_planned_anew(t: float, place: float, answer: float, anew: bool) -> None:
     policy = Scripted({"one": drive(1.3)}, {"one": drive(2.3)})
