@@ -525,9 +525,10 @@ class UgvLinks:
 class Channel:
     """What happens to messages between UAVs and UGVs. Without it they arrive at once, and none is lost.
 
-    The fate of a message depends on `seed`, its link, its number and how often it was sent before, and on nothing else:
-    with another delay the same messages are lost. Who waits for an answer repeats the message after twice the delay,
-    the jitter and 0.15 s. Robots see each other as they are, UGVs only without `ugvs`.
+    The fate of a message depends on `seed`, its link, its number and how often it was sent before; with `burst_s` on
+    when it is sent, too. Who waits for an answer repeats the message after the delays of both ways, the larger jitter
+    and 0.15 s (or one period each of gatekeeper, control and planner, if that is longer). All robots know where the
+    others are; with `ugvs` UGVs know other UGVs only from messages.
     """
 
     delay_s: NotNegative = 0.0

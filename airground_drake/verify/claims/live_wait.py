@@ -19,7 +19,7 @@ class Bound(Proof):
 
 class LiveWait(TheoremClaim):
     id = "LIVE-WAIT"
-    summary = "No UAV can keep a UGV from its own task for ever."
+    summary = "No UAV keeps a UGV from its own task for longer than a bound at a time; then the UGV rests."
     statement = (
         "Under method (d) a UAV keeps a UGV from its own task for a bounded time at most. Then the UGV is on its own "
         "until it has rested. This holds whatever the UAV proposes, withdraws, says of its map or names as its cause, "
@@ -40,8 +40,8 @@ class LiveWait(TheoremClaim):
         "Rounding of times, 1e-15 s, is not counted.",
     )
     does_not_establish = (
-        "That an accepted intervention is useful, that the UGV gets anywhere on its own, or that refused proposals "
-        "cost only messages. Safety is SAFE-GATE."
+        "How often a UAV does so: after each rest it may again. Nor that an accepted intervention is useful, that the "
+        "UGV gets anywhere on its own, or that refused proposals cost only messages. Safety is SAFE-GATE."
     )
 
     theorems: tuple[str, ...] = ("Patience.bounded",)

@@ -17,8 +17,8 @@ from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 ROUNDED_M = 1e-12  # by so much rounding may make a distance of the law too small, m
 BASIC = ("Budget.at_samples", "Budget.budget_always")
 # Those about a robot beside an obstacle that may move; a plant adds its own.
-OF_STANDING = ("Budget.one_stands", "Budget.smaller_gain")
-OF_ERRORS = ("Budget.measured_start", *OF_STANDING, "Mixed.entry_keeps")
+OF_STANDING = ("Budget.one_stands", "Budget.smaller_gain", "Mixed.entry_keeps")
+OF_ERRORS = ("Budget.measured_start", *OF_STANDING)
 BESIDE_MOVING = ("Passive.own_doing", "Passive.kept")
 
 
@@ -68,8 +68,8 @@ class SafeBudget(TheoremClaim):
     margin_of = "distance in the law less what the plants take"
 
     def applies(self, scenario: Scenario) -> bool:
-        """Only a scenario with robots that are not where the law steers or sees them."""
-        return takes_room(scenario)
+        """Only a scenario with robots that are not where the law steers or sees them, or that may lack a position."""
+        return takes_room(scenario) or scenario.ugv_links is not None
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         """Gain and period; the plants and their speed limits; the distances of each kind of pair."""
@@ -88,7 +88,7 @@ class SafeBudget(TheoremClaim):
                     "first": pair.first, "second": pair.second, "kind": pair.kind, "law_m": pair.law_m,
                     "safe_m": pair.promised_m + pair.radii_m,
                 }
-                for pair in (group[0] for group in alike(budget(scenario))) if pair.terms
+                for pair in (group[0] for group in alike(budget(scenario))) if pair.terms or stands
             ],
         }  # fmt: skip
 

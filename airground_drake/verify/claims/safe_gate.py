@@ -36,6 +36,7 @@ class SafeGate(SafeInv):
     equations = "(20) against the priorities of method (d); (5), (7)-(8), (14)"
     assumptions = (
         "SAFE-INV and its assumptions; the state is safe at the start.",
+        "The run's composition is 'augmented', the default; the paper's recursion does not scale the command back.",
         "The UAV flies by its own avoidance layer: it takes half of each inequality, straight above a UGV all of it.",
     )
     does_not_establish = (
