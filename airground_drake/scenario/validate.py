@@ -558,7 +558,7 @@ def _measured(scenario: Scenario) -> Problems:
     key, control = "sensing.position_error_m", scenario.control
     for name, barrier in scenario.barriers.items():
         if barrier.expected_speed_m_s:
-            yield key, error_m, f"0, or {name} at rest: beside what may move nothing is promised where positions are measured"
+            yield key, error_m, f"0, or {name} at rest: beside what may move nothing is promised with errors"
     for run, spec in scenario.runs.items():
         if spec.composition != "augmented":
             yield f"runs.{run}.composition", spec.composition, f"augmented: robots stand where {key} asks for it"
