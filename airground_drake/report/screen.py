@@ -333,9 +333,12 @@ def _real(report: Report) -> str:
     """That real robots and other starts may differ; with what a user's plant showed of what it declares."""
     own = [plant for claim in report.about(rules.CONDITIONS) for plant in claim.evidence.get("own_plants", ())]
     if not own:
-        error_m = report.scenario.resolved.position_error_m
-        perfect = "sensing is perfect" if report.scenario.resolved.ugv_links is None else "positions heard are exact"
+        given = report.scenario.resolved
+        error_m, faults = given.position_error_m, given.faults
+        perfect = "sensing is perfect" if given.ugv_links is None else "positions heard are exact"
         sensing = f"errors of positions are at most {error_m:g} m" if error_m else perfect
+        if faults and (faults.position_error_m or faults.late):
+            sensing = "positions are worse than declared"
         return f"other starts or real robots end so, too: arrival is only seen, and {sensing} here"
     most = max(own, key=lambda plant: float(plant["cover_m"]))
     return (

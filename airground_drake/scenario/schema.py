@@ -82,7 +82,7 @@ SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
 OPTIONAL: dict[str, object] = {
-    "channel": None, "sensing": None, "ugv_controller": None,
+    "channel": None, "sensing": None, "faults": None, "ugv_controller": None,
     "uav": None, "uavs": {}, "ugvs": [], "lost_at_s": 0.0, "uav_m": 0.0,
 }  # fmt: skip
 """Keys that may be left out, and their values then: a scenario is written and digested as if these did not exist."""
@@ -341,6 +341,19 @@ class Sensing:
     """Largest error of a UGV's position that the UAV plans with, drawn; no distance rests on it."""
     seed: CountFromZero = 0
     """Seed of the errors."""
+
+
+@dataclass(slots=True)
+class Faults:
+    """What goes beyond the bounds that a scenario declares: it is said of each run which hypothesis broke first.
+
+    A robot that does not go where it is told is a plant of your own that exceeds its `drift_m_s`.
+    """
+
+    position_error_m: NotNegative = 0.0
+    """By how much more a robot's published position is off than `sensing.position_error_m` allows."""
+    late: Chance = 0.0
+    """Share of control samples at which announced positions come a period later than `channel.ugvs` allows."""
 
 
 @dataclass(slots=True)
@@ -680,6 +693,8 @@ class Scenario:
     """A controller of your own, in place of the package's."""
     sensing: Sensing | None = None
     """Errors of measured positions."""
+    faults: Faults | None = None
+    """Faults beyond what is declared."""
     decision: Decision = field(default_factory=Decision)
     """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)

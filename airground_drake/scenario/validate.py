@@ -543,6 +543,14 @@ def _standing(scenario: Scenario) -> Problems:
             yield f"{scenario.key_of(name)}.plant.drift_m_s", drift, allowed
 
 
+def _faults(scenario: Scenario) -> Problems:
+    """What a fault exceeds is declared."""
+    if (faults := scenario.faults) and faults.position_error_m and scenario.sensing is None:
+        yield "faults.position_error_m", faults.position_error_m, "0 without sensing: exact positions are published"
+    if faults and faults.late and not scenario.announces:
+        yield "faults.late", faults.late, "0 without channel.ugvs.delay_s: no position is announced"
+
+
 def _measured(scenario: Scenario) -> Problems:
     """The law bears the errors of measured positions: its gain is large enough, and nothing may move by itself."""
     if not (error_m := scenario.position_error_m):
@@ -550,7 +558,7 @@ def _measured(scenario: Scenario) -> Problems:
     key, control = "sensing.position_error_m", scenario.control
     for name, barrier in scenario.barriers.items():
         if barrier.expected_speed_m_s:
-            yield key, error_m, f"0: {name} may move, and nothing is promised beside it where positions are measured"
+            yield key, error_m, f"0, or {name} at rest: beside what may move nothing is promised with errors"
     for run, spec in scenario.runs.items():
         if spec.composition != "augmented":
             yield f"runs.{run}.composition", spec.composition, f"augmented: robots stand where {key} asks for it"
@@ -641,7 +649,6 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
     _uavs, _names, _reserved, _charges, _ugv_links, _shapes, _map, _blocks, _route, _runs, _plants,
-    _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _standing, _measured,
-    _budget,
-    _reproduction, _choices,
+    _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _standing, _faults,
+    _measured, _budget, _reproduction, _choices,
 )  # fmt: skip

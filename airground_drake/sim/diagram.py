@@ -5,7 +5,7 @@ Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (pre
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -22,7 +22,7 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import COMPOSITIONS, Composition
 from airground_drake.model.law.task import Task
 from airground_drake.scenario.load import validated
-from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.schema import Faults, Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import (
@@ -181,7 +181,8 @@ def build_model(
         links = Downlink(down, sent, start, period, retry, components.lost_at(scenario)), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}
     if scenario.sensing:
-        parts["sensing"] = PositionSensing(Errors(scenario.sensing, world), world)
+        error_m = scenario.position_error_m + (scenario.faults or Faults()).position_error_m
+        parts["sensing"] = PositionSensing(Errors(replace(scenario.sensing, position_error_m=error_m), world), world)
     parts |= between.parts
     if monitor is not None:
         parts["monitor"] = monitor

@@ -70,6 +70,8 @@ class Batch:
                 raise LeftToDrakeError(f"the plant of {body.name}")
         if given.sensing is not None:
             raise LeftToDrakeError("errors of measured positions")
+        if given.faults is not None:
+            raise LeftToDrakeError("faults")
         (flown_by, uav), *more = given.aerial.items()
         if given.channel is not None and method.intervenes:
             raise LeftToDrakeError("a channel")

@@ -45,9 +45,11 @@ class Announcements(LeafSystem):
     Rate: one update per control period, from t = 0.
     """
 
-    def __init__(self, world: World, period: float) -> None:
+    def __init__(self, world: World, period: float, late: float = 0.0) -> None:
+        """With a share `late` of samples at which all have what was said a period before."""
         super().__init__()
         self._ugvs, self._period, size = world.select("ugv"), period, 3 * len(world.moving)
+        self._late = late
         self._bodies = declare_bodies(self, world)
         self._command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
         self.DeclareDiscreteState(size + 1)
@@ -58,7 +60,9 @@ class Announcements(LeafSystem):
         places = self._bodies.Eval(context).reshape(-1, 3).copy()
         *last, begun = context.get_discrete_state(0).value()
         if begun:
-            led = self._period * self._command.Eval(context).reshape(-1, 3)
+            sample = int((context.get_time() + SAME_S) / self._period)
+            on_time = random.Random(f"late/{sample}").random() >= self._late
+            led = on_time * self._period * self._command.Eval(context).reshape(-1, 3)
             places[self._ugvs] = np.reshape(last, (-1, 3))[self._ugvs] + led
         output.SetFromVector(places.ravel())
 
@@ -182,7 +186,7 @@ def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
     )
     parts, renamed = dict[str, LeafSystem](), dict[System, Mapping[str, str]]()
     if link and link.delay_s:
-        parts["announcements"] = Announcements(world, period)
+        parts["announcements"] = Announcements(world, period, scenario.faults.late if scenario.faults else 0.0)
         renamed[parts["announcements"]], published = {"bodies": published}, "announced"
     if not (scenario.channel and link and link.loss):
         return Between(UgvController(world, law), parts, renamed, published)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain, combinations
 from typing import Any, NamedTuple
@@ -119,6 +120,7 @@ def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded:
         "unit": str(rows["unit"].iloc[0]),
         "margins": _quantiles(margins["margin"].to_numpy()),
         "worst": worst[["index", "margin", "status"]].to_dict("records"),
+        "broken_first": Counter(what.partition(",")[0] for what in rows["what"] if what),
         "refuted_draws": tested.loc[tested["status"] == "refuted", "index"].head(WORST).tolist(),
         "undecided_draws": rows.loc[undecided, "index"].head(WORST).tolist(),
         "fails_where": _where(violated, drawn) if 0 < violated.sum() < len(violated) else None,

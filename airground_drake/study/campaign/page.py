@@ -54,9 +54,10 @@ def told(result: Mapping[str, Any]) -> list[Line]:
         elif claim["refuted"]:
             bound = f"; probability {number(bounds[0], 2)} to {number(bounds[1], 2)} ({confidence})" if bounds else ""
             admitted = "" if claim["differs"] else ", which the scenario admits"
-            lines.append(
-                Line("no", f"{what}: refuted in {claim['refuted']} of {claim['tested']} runs{admitted}{bound}.")
-            )
+            counts = claim["broken_first"].items()
+            first = f"; broken first: {', '.join(f'{name} ({count})' for name, count in counts)}" if counts else ""
+            runs = f"refuted in {claim['refuted']} of {claim['tested']} runs{admitted}"
+            lines.append(Line("no", f"{what}: {runs}{first}{bound}."))
         elif claim["undecided"]:
             lines.append(Line("open", f"{what}: undecided in {claim['undecided']} runs."))
         elif claim["tested"]:

@@ -212,9 +212,12 @@ def died(index: int) -> list[Row]:
 
 
 def _of_claim(verdict: Verdict) -> Row:
-    finding = verdict
+    finding, against = verdict, verdict.counterexample or {}
+    who = " and ".join(str(against[key]) for key in ("robot", "first", "second", "other") if key in against)
+    broken = f"{against['hypothesis']}, {who or 'all'} at {against['t_s']:.2f} s" if "hypothesis" in against else ""
     return {
         "claim": verdict.claim.id,
+        "what": broken,
         "status": finding.status,
         "as_expected": verdict.as_expected is not False,
         "margin": float("nan") if finding.margin is None else float(finding.margin),

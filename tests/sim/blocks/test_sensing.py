@@ -131,7 +131,7 @@ def test_the_model_says_what_the_budget_needs() -> None:
     [
         ({"control.avoidance_gain_1_s": 5.6}, r"avoidance_gain_1_s: 5.6 .*at least 5\.64\d+ 1/s .*stand for the other"),
         ({"control.avoidance_gain_1_s": 0.0}, "at least"),
-        ({"obstacles.rock.max_speed_m_s": 0.1}, "0: rock may move, and nothing is promised"),
+        ({"obstacles.rock.max_speed_m_s": 0.1}, "0, or rock at rest: beside what may move"),
         ({"runs.a.composition": "recursion_listed"}, "augmented: robots stand"),
         ({"ugvs.ugv2.start_m": [-4.33, 0.0, 0.0]}, r"needs 0\.71 m in the law .*they start 0\.67 m apart"),
         ({"sensing.position_error_m": -0.1}, "a number in m from 0"),

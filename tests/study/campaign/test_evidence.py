@@ -169,10 +169,12 @@ def test_the_page_says_first_what_was_found_and_what_separates_failures() -> Non
         for i in range(80)
     ]
     rows += [row(i, run="b", drawn={}) for i in range(80)]
+    rows[1]["what"] = "announced position, ugv1 at 1.05 s"
     found = conclude(rows) | {"name": "<b>"}
     says = [tuple(line) for line in told(found)]
     assert [mark for mark, _ in says] == ["no", "yes"]
-    assert says[0][1].startswith("SAFE-TRACE in run d: refuted in 20 of 80 runs; probability 0.1")
+    first = "; broken first: announced position (1); probability 0.1"
+    assert says[0][1].startswith(f"SAFE-TRACE in run d: refuted in 20 of 80 runs{first}")
     assert says[1][1].startswith("SAFE-TRACE in run b: never refuted in 80 runs; probability of a violation at most 0.")
     text = page(found, table(rows))
     assert "SAFE-TRACE in run d fails in 20 of 20 runs with gain 1, and in 0 of 20 runs with gain" in text

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import SimulationError
+from airground_drake.base.errors import ScenarioError, SimulationError
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
+from airground_drake.scenario.load import load
 from airground_drake.sim.batch import loop
 from airground_drake.sim.batch.loop import Team
 from airground_drake.sim.batch.run import Going
@@ -49,6 +50,28 @@ def spec(tmp_path: Path) -> Spec:
     for name, text in (("mine.yaml", TEXT), ("slow.py", SLOW), ("idle.py", IDLE)):
         (tmp_path / name).write_text(text, encoding="utf-8")
     return load_spec(tmp_path / "mine.yaml")
+
+
+@pytest.mark.parametrize(("more", "first"), [
+    ("sensing: {position_error_m: 0.02}, faults: {}", ""),
+    ("sensing: {position_error_m: 0.02}, faults: {position_error_m: 0.02}", "error of the measured position, ugv1 at "),
+    ("channel.ugvs.delay_s: 0.02, faults: {}", ""),
+    ("channel.ugvs.delay_s: 0.02, faults: {late: 0.2}", "announced position, ugv1 at "),
+])  # fmt: skip
+def test_a_row_says_which_hypothesis_broke_first(more: str, first: str, tmp_path: Path) -> None:
+    text = TEXT.replace("duration_s: 2.0", f"duration_s: 4.0, control.avoidance_gain_1_s: 10.0, {more}")
+    (tmp_path / "mine.yaml").write_text(text.replace("ZENO-TRACE", "SAFE-HYP"), encoding="utf-8")
+    of = {row["claim"]: row for row in work.rows_of(load_spec(tmp_path / "mine.yaml"), 5, DEFAULT_LIMITS)}
+    assert (of["SAFE-TRACE"]["status"], of["SAFE-TRACE"]["what"]) == ("holds", "")
+    assert of["SAFE-HYP"]["status"] == ("refuted" if first else "holds")
+    assert of["SAFE-HYP"]["what"].startswith(first)
+    assert of["SAFE-HYP"]["what"].endswith(" s") == bool(first)
+
+
+@pytest.mark.parametrize("faults", ["{position_error_m: 0.1}", "{late: 0.1}"])
+def test_a_fault_exceeds_what_is_declared(faults: str) -> None:
+    with pytest.raises(ScenarioError, match="0 without"):
+        load("minimal", [f"faults={faults}"])
 
 
 def test_a_row_for_each_run_and_claim(spec: Spec) -> None:
