@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
-from pydrake.systems.primitives import ConstantVectorSource, Integrator, LinearSystem
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, Integrator
 
 import airground_drake
 from airground_drake import ScenarioError, UnknownNameError, build_diagram, load, notebook, plot, simulate
@@ -172,22 +172,6 @@ def test_it_can_be_embedded_and_disturbed(case_a: Scenario) -> None:
     expected = -0.2 * (1.0 - np.exp(-2.0)) / 2.0
     assert moved[1, 0] - still[1, 0] == pytest.approx(expected, rel=0.1)
     assert np.abs(moved[0] - still[0]).max() < 1e-9
-
-
-def test_another_plant(case_a: Scenario) -> None:
-    """UGV2's motors pass on nine tenths of their command."""
-
-    def weak(start: Array) -> System:
-        plant = LinearSystem(A=np.zeros((3, 3)), B=0.9 * np.eye(3), C=np.eye(3), D=np.zeros((3, 3)))
-        plant.configure_default_state(start)
-        return plant
-
-    steps = []
-    for plants in ({}, {"ugv2": OwnPlant(weak, drift_m_s=0.0, cover_m=0.0)}):
-        diagram = build_diagram(case_a, "d", plants=plants)
-        steps.append(positions(diagram, advanced(diagram, 0.05).get_context()) - starts(case_a))
-    assert steps[1][1] == pytest.approx(0.9 * steps[0][1])
-    assert np.array_equal(steps[0][0], steps[1][0])
 
 
 class Hold(PositionTask):

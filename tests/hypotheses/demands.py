@@ -45,7 +45,6 @@ class Demands:
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
-        """Of a scenario."""
         ugvs, uav, control = list(scenario.ugvs.values()), scenario.uav, scenario.control
         obstacles, count = list(scenario.obstacles.values()), len(ugvs) + 1
         radius = np.array([*(ugv.radius_m for ugv in ugvs), uav.radius_m])
@@ -66,7 +65,6 @@ class Demands:
         )
 
     def inequalities(self, positions: Array) -> Inequalities:
-        """What every velocity must satisfy when the robots are at positions (R, 3), m."""
         offset = positions[:, None] - np.vstack([self.obstacles, positions])
         distance = np.linalg.norm(offset, axis=-1)
         normal = offset / np.where(distance > 0.0, distance, 1.0)[..., None] * self.mobility[:, None]
@@ -77,23 +75,12 @@ class Demands:
 
 
 def limited(velocity: Array, most: Array) -> Array:
-    """Velocities (n, 3) shortened to at most `most` (n,), m/s."""
     speed = np.linalg.norm(velocity, axis=1)
     found: Array = velocity * np.where(speed > most, most / np.maximum(speed, 1e-300), 1.0)[:, None]
     return found
 
 
 def unit(rng: np.random.Generator, count: int) -> Array:
-    """Random unit vectors, (count, 3)."""
     found = rng.normal(size=(count, 3))
     found /= np.linalg.norm(found, axis=1, keepdims=True)
-    return found
-
-
-def nearest(x: Array, velocity: Array, period: float) -> Array:
-    """Least distance of x + s v from the origin over s in [0, period], exact but for rounding; (...,), m."""
-    step = period * velocity
-    squared, along = (step**2).sum(axis=-1), -(x * step).sum(axis=-1)
-    s = np.clip(np.divide(along, squared, out=np.zeros_like(along), where=squared > 0.0), 0.0, 1.0)
-    found: Array = np.linalg.norm(x + s[..., None] * step, axis=-1)
     return found

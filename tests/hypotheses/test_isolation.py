@@ -79,7 +79,6 @@ def _ranges(before: Array, after: Array) -> Array:
 def _running(
     variable: DecisionVariable, system: EventTrigger, modes: npt.NDArray[np.int64], before: Array, after: Array
 ) -> list[bool]:
-    """For which UGVs the running systems make a transition at the end of their step."""
     count, step = len(modes), 0.1
     source = variable.CreateDefaultContext()
     source.SetTime(1.0 + step)
@@ -134,5 +133,4 @@ def _range(before: Array, after: Array) -> tuple[float, float]:
 
 
 def _dot(a: list[Any], b: list[Any]) -> Any:
-    """Product of two errors, without their noise."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -5,14 +5,9 @@ Both compare times and levels only. So every order of the values, ties and next 
 
 import itertools
 import math
-from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
-import pytest
-
-from airground_drake.base.arrays import Array
 from airground_drake.model.trigger.automaton import Mode, Trigger, TriggerState
 from airground_drake.ugv.patience import Commitment, Patience
 
@@ -22,7 +17,6 @@ LEVELS = [(3.0, 1.5, 0.5), (3.0, 3.0, 0.0), (3.0, 3.0, 0.5), (1.5, -0.5, 2.0)]
 
 
 def around(*values: float) -> list[float]:
-    """The values, the next floats on both sides, and numbers far from all."""
     found = {value for each in values for value in (each, math.nextafter(each, -9e9), math.nextafter(each, 9e9))}
     return sorted(found | {min(values) - 1.0, max(values) + 1.0})
 
@@ -51,7 +45,6 @@ def seen(state: TriggerState) -> tuple[Mode, int, float]:
 
 
 def differing(kind: type[Trigger]) -> list[Any]:
-    """States and events at which a trigger does not do what the model does."""
     found: list[Any] = []
     for levels in LEVELS:
         trigger, (zeta, release, dwell) = kind(*levels), levels
@@ -72,49 +65,11 @@ def test_the_trigger_makes_the_transitions_of_the_theorem() -> None:
     assert differing(Trigger) == []
 
 
-class Late(Trigger):
-    """Triggers are noted too late."""
-
-    def step(self, state: TriggerState, t: float, x: float) -> TriggerState:
-        after = super().step(state, t, x)
-        return replace(after, triggered_at=t + 1e-9) if after.triggers > state.triggers else after
-
-
-class Impatient(Trigger):
-    """The dwell is over at once."""
-
-    @property
-    def levels(self) -> Array:
-        return np.array([self.zeta, self.release, 0.0])
-
-
-class Forgetful(Trigger):
-    """A release forgets the triggers."""
-
-    def step(self, state: TriggerState, t: float, x: float) -> TriggerState:
-        after = super().step(state, t, x)
-        return TriggerState(after.mode, 0, -1.0, after.released_at) if after.released_at == t else after
-
-
-class Free(Trigger):
-    """A release is free at once, whatever is left of the dwell."""
-
-    def step(self, state: TriggerState, t: float, x: float) -> TriggerState:
-        after = super().step(state, t, x)
-        return replace(after, mode=SUPERVISING) if state.mode is INTERVENING is not after.mode else after
-
-
-@pytest.mark.parametrize("wrong", [Late, Impatient, Forgetful, Free])
-def test_a_trigger_that_differs_is_noticed(wrong: type[Trigger]) -> None:
-    assert differing(wrong)
-
-
 TIMES = (2, 5.0, 3.0)
 """Tries, rest and longest try."""
 
 
 def impatient(kind: type[Patience]) -> list[str]:
-    """What of a patience differs from Patience.v."""
     most, rest, longest = TIMES
     patience, found = kind(*TIMES), set[str]()
     for executing, tries, t in itertools.product((False, True), (0, 1, 2, 3), around(10.0, 10.0 + rest)):
@@ -138,16 +93,3 @@ def impatient(kind: type[Patience]) -> list[str]:
 
 def test_patience_makes_the_transitions_of_the_theorem() -> None:
     assert impatient(Patience) == []
-
-
-@pytest.mark.parametrize(
-    ("method", "wrong"),
-    [
-        ("exhausted", lambda _, now: False),
-        ("rested", lambda _, now, t: Commitment(now.executing, 0, now.since, now.until)),
-        ("accept", lambda _, now, t, end: Commitment(True, now.tries + 1, t, end)),  # as long as the proposal
-        ("accept", lambda self, now, t, end: Commitment(True, now.tries, t, min(end, t + self.longest))),  # uncounted
-    ],
-)
-def test_a_patience_that_differs_is_noticed(method: str, wrong: Any) -> None:
-    assert impatient(type("Wrong", (Patience,), {method: wrong})) == [method]

@@ -40,8 +40,6 @@ def uav_among(
 
 
 def answering(rule: Callable[[Proposal | None, float], bool]) -> Patch:
-    """Proposals are executed by another rule, from a proposal and the answer that there is."""
-
     def wrong(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
         return [p if rule(p, answers[2 * i]) else None for i, p in enumerate(proposals)]
 
@@ -49,7 +47,6 @@ def answering(rule: Callable[[Proposal | None, float], bool]) -> Patch:
 
 
 def swapped(patch: pytest.MonkeyPatch) -> None:
-    """Two UGVs' commands exchanged on their way."""
     right = UgvLaw.velocity
 
     def wrong(self: UgvLaw, *args: Any) -> Array:

@@ -28,12 +28,7 @@ COMMAND_M_S = 1e-7
 
 
 def differences(scenario: Scenario, build: Any = build_model) -> tuple[list[str], set[tuple[str, str]]]:
-    """In which ways the built diagram is not what the scenario says, up to the first, and the pairs that bound.
-
-    Args:
-        scenario: what is demanded, and what the diagram is built from.
-        build: makes the model.
-    """
+    """In which ways the built diagram is not what the scenario says, up to the first, and the pairs that bound."""
     demands, rng = Demands.of(scenario), np.random.default_rng(1)
     probe = Probe(scenario, demands, build)
     wrong = probe.sampled_otherwise()
@@ -46,7 +41,6 @@ def differences(scenario: Scenario, build: Any = build_model) -> tuple[list[str]
 
 
 def states(demands: Demands, rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
-    """Positions (R, 3), m, and the direction in which each robot is drawn, (R, 3)."""
     count, m = len(demands.robots), len(demands.obstacles)
     away = np.arange(count)[:, None] * [200.0, 0.0, 0.0] + [1e3, 1e3, 0.0]
     pairs = [(i, k) for i in range(count) for k in range(m)] + [(i, m + j) for j in range(count) for i in range(j)]
@@ -74,7 +68,6 @@ class Probe:
     """The built diagram in a context of its own."""
 
     def __init__(self, scenario: Scenario, demands: Demands, build: Any) -> None:
-        """Build it."""
         self._demands, self._scenario = demands, scenario
         diagram = build(scenario, "d").diagram
         self._root = diagram.CreateDefaultContext()
@@ -93,7 +86,6 @@ class Probe:
     def look(
         self, positions: Array, towards: Array, how: str, rng: np.random.Generator, bound: set[tuple[str, str]]
     ) -> list[str]:
-        """What is wrong at positions (R, 3), m, with all robots driven along `towards`; pairs that bind are added."""
         demands, n, m = self._demands, len(positions) - 1, len(self._demands.obstacles)
         push = towards * demands.max_speed[:, None] * rng.choice([1.0, 1.5, 10.0])
         executed = how == "accepted"
@@ -146,11 +138,7 @@ class Probe:
 
 
 def closest_velocity(wanted: Array, normal: Array, bound: Array) -> tuple[Array, Array]:
-    """Of each robot the velocity closest to `wanted` (R, 3) with n.v >= b, by projections in turn (Dykstra).
-
-    Returns:
-        The velocity, (R, 3), m/s; which inequalities it meets with equality, (R, K).
-    """
+    """Of each robot the velocity closest to `wanted` (R, 3) with n.v >= b, by projections in turn (Dykstra)."""
     velocity = wanted.copy()
     square = np.maximum((normal**2).sum(axis=-1), 1e-18)
     correction = np.zeros_like(normal)

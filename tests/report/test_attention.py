@@ -9,9 +9,7 @@ from report.cases import FINE, built, verdict
 
 from airground_drake.report import attention
 from airground_drake.report.model import of
-from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Scenario
-from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 
 
@@ -88,28 +86,6 @@ def test_for_whom_the_uav_found_no_way(scenario: Scenario, traces: dict[str, Tra
     assert (item.words, item.run) == ("the UAV found no way for ugv1 and ugv2", "c")
     report["runs"]["c"]["faults"] = [{"t_s": 1.0, "robot": "ugv1", "policy": "mine", "what": "no"}]
     assert [item.words for item in items(report)][1:] == ["the UAV found no way for ugv2"]
-
-
-def test_for_whom_the_uav_finds_no_way_any_more() -> None:
-    """It sent one, but then a door shut for good."""
-    scenario = load(
-        "minimal",
-        {
-            "arena_m": [[-2.0, -3.0], [12.0, 3.0]],
-            "safe_distance.obstacle_m": 0.4,
-            "obstacles": {
-                "wall": {"segment_m": [[6.0, -1.0], [6.0, 3.0]]},
-                "door": {"segment_m": [[6.0, -3.0], [6.0, -1.0]], "appears_s": 9.0, "known_to_uav": False},
-            },
-            "intervention.policies": [{"name": "coordinate"}],
-            "runs": {"d": {"method": "d"}},
-            "duration_s": 14.0,
-        },
-    )
-    trace = simulate(scenario, "d")
-    found = [item.words for item in items(built(scenario, {"d": trace}, [verdict("d", "holds")]))]
-    assert len(trace.proposals) == 1
-    assert "the UAV found no way for ugv1: no plan exists: on the UAV's map, ugv1 cannot come to the target" in found
 
 
 KEYS = st.sampled_from([*attention.ROLES, *TOO_NEAR, *END, "t_s", "hypothesis", "margin", "unit", "kind"])

@@ -131,10 +131,3 @@ def test_audit_is_made_from_the_runs_and_leaves_out_what_they_do_not_show(
     report = document.build(scenario, moving, FINE, {}, audit=[*of_runs(scenario, moving), extra], audited=True)
     assert [item["id"] for item in report["audit"]] == [2]
     assert (report["overall"]["status"], report["overall"]["undemonstrated"]) == ("not_as_expected", [2])
-
-
-def test_a_choice_may_be_an_entry_of_a_list_or_what_a_run_sets() -> None:
-    runs = {"c_literal": {"set": {"gatekeeper.route": "nonlinear"}}}
-    resolved = {"ugvs": {"ugv1": {"start_m": [1.0, 2.0]}}, "policies": [{"name": "detour"}], "runs": runs}
-    keys = "ugvs.ugv1.start_m.1", "policies.0.name", "policies.1.name", "runs.c_literal.set.gatekeeper.route"
-    assert [document._at(resolved, key) for key in keys] == [2.0, "detour", None, "nonlinear"]

@@ -14,13 +14,6 @@ JSON = st.recursive(
 )
 
 
-def test_names_of_keys_in_words() -> None:
-    keys = ("min_distance_m", "gain_1_s", "speed_m_s", "noise_m_sqrt_s", "refuse_outcome_m2_s", "pairs", "m")
-    assert [html.in_words(key) for key in keys] == [
-        "min distance, m", "gain, 1/s", "speed, m/s", "noise, m/√s", "refuse outcome, m²s", "pairs", "m",
-    ]  # fmt: skip
-
-
 def test_values_records_and_records_by_name() -> None:
     found = html.tables(
         {

@@ -18,7 +18,7 @@ from report.cases import FLIGHT, event, make_scenario, make_trace
 
 from airground_drake.report.figures import draw, maps, timelines
 from airground_drake.report.figures.panels import Figure
-from airground_drake.report.view import canvas, labels, svg
+from airground_drake.report.view import canvas, svg
 from airground_drake.report.view.plane import frame_of, thumbnail_of
 from airground_drake.scenario.schema import Run, Scenario
 from airground_drake.sim.trace import Trace
@@ -57,7 +57,6 @@ def test_every_colour_has_another_one_in_the_dark(drawn: list[Figure]) -> None:
 
 
 def team(scenario: Scenario, size: int, *, triggered: str = "") -> tuple[Scenario, dict[str, Trace]]:
-    """UGVs side by side, far from each other, in one run."""
     names = [f"ugv{k}" for k in range(1, size + 1)]
     own = replace(
         scenario, name="mine", reproduction=[], ugvs={name: replace(scenario.ugvs["ugv1"]) for name in names},
@@ -136,14 +135,6 @@ def test_runs_with_identical_paths_share_a_panel(scenario: Scenario, traces: dic
     assert len(trajectories.panels) == 3
 
 
-def test_a_run_that_sets_values_is_named_by_them(scenario: Scenario, traces: dict[str, Trace]) -> None:
-    run = Run("c", set={"gatekeeper.route": "nonlinear", "gatekeeper.rule": "first_stage", "control.period_s": 0.1})
-    trajectories, *_ = draw.draw(replace(scenario, runs={"c": run}), {"c": traces["c"]})
-    assert trajectories.panels[0].heading == (
-        "Run c: method (c) with (27) by multiple shooting, the first stage applied, control.period_s 0.1"
-    )
-
-
 def test_a_shortfall_says_from_whom(scenario: Scenario, traces: dict[str, Trace], drawn: list[Figure]) -> None:
     assert {"ugv1 to obstacle_2", "ugv1 to uav"} <= set(drawn[1].panels[0].table.columns)
     one = {"printed": replace(traces["a_printed"], meta={**traces["a_printed"].meta, "run": "printed"})}
@@ -151,13 +142,6 @@ def test_a_shortfall_says_from_whom(scenario: Scenario, traces: dict[str, Trace]
     assert distances.caption.startswith("Too close: ugv1 is 1.")
     assert "not 2 m" in distances.panels[0].svg
     assert canvas.ALARM in distances.panels[0].svg
-
-
-def test_times_of_events_are_written(drawn: list[Figure]) -> None:
-    text = drawn[2].panels[1].svg.replace("\N{NO-BREAK SPACE}", " ")
-    assert ">trigger 14.50, proposal 14.60, accepted 14.65 s</text>" in text
-    assert ">release 17.00 s</text>" in text
-    assert "nothing happens in the other 26.1 s" in text
 
 
 @given(st.lists(st.floats(0.0, 100.0), max_size=30))
@@ -186,15 +170,6 @@ def test_labels_of_events_are_inside_the_figure_and_apart(times: list[float], ra
     assert not any(one.overlaps(other) for k, one in enumerate(texts) for other in texts[:k])
 
 
-def test_many_events_are_counted() -> None:
-    happened = [event(10.0 + k, kind) for k in range(6) for kind in ("trigger", "release")]
-    trace = make_trace(make_scenario(), "a", events=happened)
-    assert (
-        timelines.told(trace, "ugv1")
-        == "6 \N{MULTIPLICATION SIGN} trigger 10.00, 6 \N{MULTIPLICATION SIGN} release 10.00 s (first times)"
-    )
-
-
 def test_a_map_says_where_a_ugv_stood_and_how_it_answered(run: Callable[[str, str], Trace]) -> None:
     trace = run("case_b", "d")
     frame = frame_of(trace.scenario, [("ugv1", trace.body("ugv1"))])
@@ -220,53 +195,12 @@ def test_a_map_says_where_a_ugv_stood_and_how_it_answered(run: Callable[[str, st
     assert all(box.x0 >= 0.0 and box.x1 <= drawing.bbox.x1 and box.y0 >= 0.0 for box in boxes)
 
 
-def test_of_many_marks_a_map_has_a_line_per_ugv(
-    run: Callable[[str, str], Trace], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    trace = run("case_b", "d")
-    monkeypatch.setattr(maps, "MAX_MARKS", 2)
-    (entry,) = maps.key_of(trace, trace.ugvs, frame_of(trace.scenario, [("ugv1", trace.body("ugv1"))]))
-    arrival_s = next(each["t_s"] for each in trace.events if each["kind"] == "arrival" and each["robot"] == "ugv1")
-    accepted_s = next(each["t_s"] for each in trace.events if each["kind"] == "accept")
-    last = f"the last accepted at {accepted_s:.2f} s"
-    assert (
-        entry.text.replace("\N{NO-BREAK SPACE}", " ")
-        == f"ugv1 arrived at {arrival_s:.1f} s; 2 proposals: 1 refused, 1 accepted, {last}"
-    )
-    assert [mark.kind for mark in entry.marks] == ["stall", "accepted"]
-
-
 def test_no_trace_and_a_single_row(scenario: Scenario) -> None:
     assert draw.draw(scenario, {}) == []
     assert draw.draw(scenario, {"a": make_trace(scenario, "a", [(0, 3.3, 0.5), (0.1, 3.3, 0.5)], step_s=0.3)})
 
 
-def test_a_path_is_dashed_from_a_collision_on(scenario: Scenario) -> None:
-    trace = make_trace(scenario, events=[event(9.0, "collision")])
-    frame = frame_of(scenario, ((robot, trace.position(robot)) for robot in trace.robots))
-    (axes,) = maps.plane(trace, ["ugv1"], frame, [], 0).axes
-    own = [line for line in axes.lines if line.get_color() == canvas.look(0).color and len(line.get_xdata()) > 1]
-    before, after = (line for line in own if line.get_alpha() is None)
-    hit = trace.position("ugv1")[trace.counting_rows("ugv1") - 1, :2]
-    for line, end in ((before, -1), (after, 0)):
-        assert np.column_stack(line.get_data())[end].tolist() == hit.tolist()
-    assert (before.get_linestyle(), after.get_linestyle()) == ("-", "--")
-
-
-def test_labels_keep_off_each_other() -> None:
-    at = np.random.default_rng(3).uniform(0.3, 0.7, (9, 2))
-    with canvas.style():
-        drawing = matplotlib.figure.Figure(figsize=(5.0, 5.0))
-        axes = drawing.add_axes((0.0, 0.0, 1.0, 1.0))
-        labels.place(axes, [labels.Label(each, f"label {k}") for k, each in enumerate(at)], [at])
-        labels.place(axes, [labels.Label(np.array([2.0, 0.0]), "outside")], [])
-        drawing.draw_without_rendering()
-        boxes = [text.get_window_extent() for text in axes.texts]
-    assert [text.get_text() for text in axes.texts] == [f"label {k}" for k in range(9)]
-    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
-
-
-def test_thinning_keeps_ends_and_extremes_cut_names_both_ends_and_labels_their_order() -> None:
+def test_thinning_keeps_ends_and_extremes() -> None:
     values = np.zeros(50_000)
     values[31_234] = 7.0
     rows = canvas.thin(values)
@@ -274,10 +208,6 @@ def test_thinning_keeps_ends_and_extremes_cut_names_both_ends_and_labels_their_o
     assert {0, 31_234, 49_999} <= set(rows.tolist())
     assert len(canvas.thin(np.zeros((50_000, 2)))) <= canvas.MAX_POINTS
     assert len(canvas.thin(values[:100])) == 100
-    assert canvas.short("obstacle_1", 12) == "obstacle_1"
-    assert canvas.short("vehicle_number_17", 12) == "vehic…ber_17"
-    assert canvas.spread([0.5, 0.51, 0.99], 0.1) == pytest.approx([0.5, 0.6, 0.99])
-    assert canvas.spread([0.98, 0.99], 0.1) == pytest.approx([0.9, 1.0])
 
 
 STYLE = "fill: #123456; font: 700 9px 'A', sans-serif; text-anchor: middle; background: url(http://e); x: y"

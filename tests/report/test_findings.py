@@ -3,16 +3,13 @@
 import xml.etree.ElementTree as ET
 
 import numpy as np
-import pytest
 
 from airground_drake.report.audit.formulas import formula_findings
-from airground_drake.report.audit.runs import findings as findings_of_runs
 from airground_drake.report.audit.thresholds import threshold_findings
 from airground_drake.report.figures import findings
 from airground_drake.report.figures.findings import of_finding
 from airground_drake.report.view import canvas
 from airground_drake.scenario.load import load
-from airground_drake.study.testing.plugin import Simulations
 from airground_drake.verify.finding import Chart
 
 
@@ -39,36 +36,6 @@ def test_what_the_papers_table_says_no_override_changes() -> None:
     for number in (4, 5, 18):
         before, after = (next(each for each in found if each["id"] == number) for found in (kept, changed))
         assert (before["paper"], before["ours"], before["finding"]) == (after["paper"], after["ours"], after["finding"])
-
-
-def test_what_comes_of_runs_is_drawn_from_what_is_kept_of_them() -> None:
-    ways = {
-        "printed": {"preset_x_m": 1.3, "way_m": [[1.0, 0.0], [1.3, 3.0]]},
-        "ours": {"preset_x_m": -1.3, "way_m": [[1.0, 0.0], [-1.3, 13.0]]},
-    }
-    gaps = {"t_s": [0.0, 1.0], "c_m": [3.0, 0.8], "d_m": [3.0, 2.0]}
-    kept = {"distance_to_the_nearest_obstacle": gaps, "safe_distance_m": 2.0}
-    errors = {
-        "task_error": {"t_s": [0.5, 1.0], "printed_m": [0.0, 0.0], "accept_m": [1.0, 2.0], "refuse_m": [1.0, 3.0]}
-    }
-    sides, intrusion, error = findings.draw(
-        [{"id": 7, "evidence": ways}, {"id": 9}, {"id": 10, "evidence": kept}, {"id": 11, "evidence": errors}]
-    )
-    assert "end, x = -1.3 m: (13, -1.3)" in sides.caption
-    assert "closest, c: (1, 0.8)" in intrusion.caption
-    assert {row[0] for row in intrusion.panels[0].table.rows} == {"c", "d", "safe distance", "closest, c", "closest, d"}
-    names = {"as printed, either", "with (23), accept", "with (23), refuse"}
-    assert {row[0] for row in error.panels[0].table.rows} == names
-
-
-def test_the_due_time_is_where_the_reference_leaves_the_threshold(run: Simulations) -> None:
-    items = findings_of_runs(load("case_a"), {"a": run("case_a", "a")})
-    (figure,), known = findings.draw(items), items[0]["evidence"]
-    reference = known["reference"]
-    assert np.interp(
-        known["reference_travelled_m"], reference["travelled_m"], reference["distance_m"]
-    ) == pytest.approx(known["zeta_m"], abs=1e-3)
-    assert "due at 1 m/s: (8.1, 3); the paper's trigger: (14.4, 3)" in figure.caption
 
 
 def test_logarithmic_axes_show_the_values_themselves_and_points_without_extent_can_be_drawn() -> None:

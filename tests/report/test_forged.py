@@ -18,7 +18,6 @@ FORGED = dict.fromkeys(("robots", "run", "method", "scenario"), (0, 0, 2, 2)) | 
 
 
 def forge(part: str, folder: Path) -> None:
-    """A report with a run whose metadata, and columns with them, have a hostile name."""
     scenario = make_scenario()
     made = make_trace(scenario, "c", GOING_ROUND, SUCCESS)
     meta: dict[str, Any] = {**made.meta, "scenario": resolved(scenario), "schema": trace.SCHEMA}

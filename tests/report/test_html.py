@@ -55,7 +55,6 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def hostile_page() -> str:
-    """Everything in report.json that somebody could have written there is hostile: also names, in a forged report."""
     scenario = make_scenario(PLACEHOLDER)
     scenario = replace(scenario, name=PLACEHOLDER, title=HOSTILE, description=HOSTILE)
     scenario.choices[0].reason = scenario.reproduction[0].why = HOSTILE
@@ -75,7 +74,6 @@ def hostile_page() -> str:
 
 
 def spoilt(value: Any) -> Any:
-    """With the hostile text in place of the placeholder, also where a report that is read may have no such text."""
     if isinstance(value, BaseModel):
         return value.model_construct(**{name: spoilt(inner) for name, inner in value})
     if is_dataclass(value):
@@ -151,7 +149,6 @@ def test_links_lead_somewhere_and_the_title_has_the_headline(page: str) -> None:
 
 
 def first(text: str) -> str:
-    """The first screen, without tags and white space."""
     found = text[text.index('<section class="first"') : text.index("<nav")]
     return " ".join(re.sub("<[^>]*>", " ", found).split())
 
@@ -169,33 +166,6 @@ def test_what_fails_is_shown_first_and_what_was_not_tested_apart(
     assert chips.count("not tested") == chips.count("\N{EMPTY SET}") == 1
     assert "What needs attention" not in page
     assert "not tested" not in page
-
-
-def test_the_cost_of_the_threshold_is_told_for_the_assumed_drift_and_for_that_of_each_run(
-    scenario: Scenario, traces: dict[str, Trace]
-) -> None:
-    """By hand: without noise 3 m is reached after 3 / 0.5 = 6 s, and the best threshold is 0."""
-    report = built(scenario, traces, FINE)
-    row = {"drift_m_s": 0.5, "noise_m_sqrt_s": 0.0, "threshold_m": 3.0, "optimum_m": 0.0, "extra_risk": 0.5 * 6.0}
-    choice = {
-        "threshold_in_force_m": 3.0,
-        "optimal_threshold_m": 2.992,
-        "extra_risk": 0.001,
-        "runs": {"c ugv 1.5": row},
-    }
-    ddm = {"error_rate": 0.25, "error_rate_of_18": 0.01, "decision_time_s": None, "decision_time_of_17_s": 5.98}
-    one, assumed = report["claims"][0], {"drift_m_s": 13.0, "noise_m_sqrt_s": 4.0, "c1_1_s": 0.5, "c2": 1.0}
-    report["claims"] += [
-        {**one, "id": "THR-CHOICE", "run": "", "inputs": assumed, "evidence": choice},
-        {**one, "id": "THR-QUALITY", "run": "c", "evidence": {"ddm": {"ugv 1.5": ddm}}},
-        {**one, "id": "THR-QUALITY", "run": "a", "evidence": {}},
-    ]
-    told = html.environment().get_template("threshold.html.j2").render(report=of(report), scenario=of(report).scenario)
-    rows = re.findall(r"<tr><th scope=\"row\">(.*?)</tr>", told, re.DOTALL)
-    assert [re.sub(r"(\s*<[^>]+>\s*)+", "|", each) for each in rows] == [
-        "assumed: 13 m/s, 4 m/√s|2.992 m|0.002 s|",
-        "ugv 1.5 in run c: 0.5 m/s, 0 m/√s|the lower, the better|6 s|25 % (1 %)|\N{EN DASH} s (5.98 s)|",
-    ]
 
 
 def test_a_chart_stands_beside_its_claim_or_where_the_rules_put_it(

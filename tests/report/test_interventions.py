@@ -60,17 +60,6 @@ def test_why_a_proposal_was_not_answered(run: Run) -> None:
     assert (lost["ended"]["how"], lost["ended"]["t_s"]) == ("lost", lost["sent_s"])
 
 
-def test_parts_of_joint_plans_are_sent_for_another_ugv(run: Run) -> None:
-    found = interventions(run("doorway", "d"))
-    assert len(found) == len(run("doorway", "d").proposals)
-    assert {each["policy"] for each in found} == {"coordinate"}
-
-
-def test_malformed_proposals_are_left_to_claims(run: Run) -> None:
-    trace = run("case_a", "d")
-    assert not interventions(replace(trace, proposals=trace.proposals.assign(robot="ugv9")))
-
-
 def test_messages_beside_always_on_supervision(run: Run) -> None:
     """`case_a` lasts 30 s, has two UGVs, and periods of 0.05 s."""
     trace = run("case_a", "d")

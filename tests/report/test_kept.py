@@ -18,7 +18,6 @@ pytestmark = pytest.mark.slow
 
 
 def said(page: str) -> tuple[list[str], list[tuple[str, ...]]]:
-    """The words of the first screen, and the status of every claim on every run."""
     first = page.partition('<section class="first"')[2].partition("</section>")[0]
     row = re.compile(r'<div id="(claim-[^"]+)"|<tr[^>]* data-run="(\w*)" data-status="(\w+)">')
     return re.sub(r"<[^>]+>", " ", first).split(), row.findall(page)

@@ -46,7 +46,6 @@ def screen_of(trace: Trace) -> tuple[Report, Row]:
 
 
 def in_the_map(trace: Trace, place: list[float]) -> float:
-    """Distance of a place from the nearest rectangle of the map, m, by their corners alone."""
     corners = corners_of_map(trace.scenario.barriers["map"].cells)
     return float(
         np.linalg.norm(np.maximum(np.maximum(corners[:, 0] - place, place - corners[:, 2]), 0.0), axis=1).min()

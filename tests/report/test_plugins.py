@@ -53,7 +53,6 @@ JUDGED = ["minimal", "duration_s=0.5", "claims={MINE: 'IT'}"]
 
 @pytest.fixture
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
-    """Write a module of its own name and give `name:It`."""
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("JUDGING", str(os.getpid()))
     name = f"evil_{abs(hash(str(tmp_path)))}"

@@ -46,13 +46,11 @@ def made(tmp_path: Path, scenario: Scenario, traces: dict[str, Trace]) -> Path:
 
 
 def rows(folder: Path) -> dict[str, str]:
-    """What the page says of each run beside SAFE-TRACE."""
     text = (folder / "report.html").read_text(encoding="utf-8")
     return dict(part.split("<!--end-->")[0].split("-->") for part in text.split("<!--Coq on ")[1:])
 
 
 def consistent(folder: Path) -> None:
-    """The checker finds every file as report.json names it."""
     recorded = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     check_files(folder, names_in(folder), recorded)
 

@@ -35,7 +35,6 @@ def claim(name: str, run: str = "", status: str = "holds", **more: Any) -> Docum
 
 
 def ran() -> Document:
-    """A run in which both UGVs arrive, the first one past the rock at 0.5 m where 0.3 m are required."""
     metrics = {
         "min_distance_m": {"r1": {"rock": dict(NEAR)}}, "min_robot_distance_m": {}, "final_position_m": {},
         "came_near": [{"first": "r1", "second": "rock", **NEAR}], "duration_s": 20.0, "on_the_way": {}, "stalls": [],
@@ -47,7 +46,6 @@ def ran() -> Document:
 
 
 def document(*edits: Edit, methods: str = "d") -> Document:
-    """All is well and proved, but for the edits."""
     robot: Document = {"start_m": AT_HOME, "target_m": AT_HOME, "preset": {"waypoints_m": [AT_HOME] * 2}, "plant": []}
     resolved = {
         "name": "small", "ugvs": {"r1": dict(robot), "r2": dict(robot)},
@@ -92,7 +90,6 @@ def gap(value: float, other: str = "rock", t_s: float = 5.0) -> Edit:
 
 
 def met(doing: str, other: str = "man", **more: Any) -> Edit:
-    """Whose doing an encounter was."""
     return judged("SAFE-TRACE", evidence={"encounters": [{"first": "r1", "second": other, "doing": doing, **more}]})
 
 
@@ -249,8 +246,6 @@ def test_uav_proposals(method: str, edits: list[Edit], lines: list[str]) -> None
 
 
 def only(run: str, *edits: Edit) -> Edit:
-    """Edits of one run and of the verdicts on it."""
-
     def edit(found: Document) -> None:
         part = {**found, "runs": {run: found["runs"][run]}, "claims": [c for c in found["claims"] if c["run"] == run]}
         for each in edits:

@@ -84,7 +84,6 @@ def proposal(number: int, t: float) -> Proposal:
 
 
 def heard(*told: tuple[int, Told]) -> Transit:
-    """What the UAV has after answers about proposals, each with what it says."""
     sent = tuple(Message("answer", k, about, 0, 0.0, 0, content) for k, (about, content) in enumerate(told))
     return Link(Quality(), 1, "up").carry(Transit(), sent, 0.0)
 

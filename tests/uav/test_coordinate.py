@@ -92,16 +92,20 @@ def test_a_robot_that_went_through_a_narrow_gap_is_led_back_through_it() -> None
     assert np.linalg.norm(ways, axis=2).min() >= 2.0 - 1e-6
 
 
-def test_a_robot_that_is_shut_in_is_planned_for_again_only_elsewhere_or_on_another_map(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    plans: list[Plan] = []
+@pytest.fixture
+def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan]:
+    """All that are made from now on."""
+    found: list[Plan] = []
 
     def counted(*given: Any, **options: Any) -> Plan:
-        plans.append(plan(*given, **options))
-        return plans[-1]
+        found.append(plan(*given, **options))
+        return found[-1]
 
     monkeypatch.setattr(coordinate, "plan", counted)
+    return found
+
+
+def test_a_robot_that_is_shut_in_is_planned_for_again_only_elsewhere_or_on_another_map(plans: list[Plan]) -> None:
     policy, ring = Coordinate(), [(2.2 * math.cos(k), 2.2 * math.sin(k)) for k in range(7)]
     shut_in, other = mate("comes", [0.0, 0.0], [12.0, 0.0]), mate("other", [9.0, 0.0], [9.0, 0.0], triggered=False)
     moved = replace(shut_in, position=np.array([0.05, 0.0, 0.0]))
@@ -119,15 +123,8 @@ def test_a_robot_that_is_shut_in_is_planned_for_again_only_elsewhere_or_on_anoth
     assert plans_for([shut_in, other], 21.0, obstacles=4) > 0
 
 
-def test_a_joint_plan_in_vain_is_made_again_only_in_another_situation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_joint_plan_in_vain_is_made_again_only_in_another_situation(plans: list[Plan]) -> None:
     """Two UGVs face each other in a corridor without a bay: each has a way alone, but not together."""
-    plans: list[Plan] = []
-
-    def counted(*given: Any, **options: Any) -> Plan:
-        plans.append(plan(*given, **options))
-        return plans[-1]
-
-    monkeypatch.setattr(coordinate, "plan", counted)
     policy, corridor = Coordinate(), [(x, y) for x in np.arange(-30.0, 30.1, 1.4) for y in (-2.2, 2.2)]
     one, other = mate("one", [-1.1, 0.0], [12.0, 0.0]), mate("other", [1.1, 0.0], [-12.0, 0.0])
 
@@ -230,8 +227,6 @@ def test_nothing_without_a_team_and_no_nonsense() -> None:
 
 
 def aside() -> Scenario:
-    """One UGV stands parked in the corridor that another one has to pass."""
-
     def ugv(start: list[float], target: list[float], through: list[float]) -> Ugv:
         return Ugv([*start, 0.0], [*target, 0.0], Preset([[*p, 0.0] for p in (start, through, target)], 0.7), 1.5)
 

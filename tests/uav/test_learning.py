@@ -6,11 +6,13 @@ UGVs have used up their tries: they arrive after 57 s in place of 30 s.
 
 import maps
 import numpy as np
+import pytest
 
 from airground_drake.scenario.load import from_data
 from airground_drake.sim.simulation import simulate
 
 
+@pytest.mark.slow
 def test_the_uav_learns_of_obstacles_from_ugvs_that_have_accepted() -> None:
     course, random = maps.draw(105, 4), np.random.default_rng(105)
     data = maps.scenario_of(course, [{"name": "coordinate", "parameters": {}}]) | {"duration_s": 40.0}

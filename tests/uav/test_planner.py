@@ -30,8 +30,6 @@ def wait(seconds: float) -> Motion:
 
 
 class Scripted(Policy):
-    """Proposes what it is told; remembers what it saw."""
-
     def __init__(self, *answers: Any) -> None:
         self.answers = list(answers)
         self.seen: list[Observation] = []
@@ -56,7 +54,6 @@ def step(
     report: Report = NOBODY[0],
     reasons: Sequence[str] = ("",) * 3,
 ) -> PlannerState:
-    """One planning instant; who is intervened on, and answers to the proposals in force, by name."""
     reports = tuple(report._replace(reason=reason) for reason in reasons)
     given = []
     for name, talk in zip(UGVS, memory.talks, strict=True):
@@ -67,7 +64,6 @@ def step(
 
 
 def in_force(memory: PlannerState) -> dict[str, tuple[float, str]]:
-    """Time of issue and cause of what is in force."""
     pairs = zip(UGVS, memory.proposals, strict=True)
     return {name: (proposal.issued, proposal.cause) for name, proposal in pairs if proposal is not None}
 

@@ -23,15 +23,11 @@ from airground_drake.verify import judge
 
 
 class Raises(Policy):
-    """A policy with a bug."""
-
     def propose(self, seen: Observation) -> Motion | None:
         raise RuntimeError("no plan")
 
 
 class Returns(Policy):
-    """A policy that returns whatever it is given, or what that makes of the observation."""
-
     def __init__(self, found: object) -> None:
         self.found = found
 
@@ -62,9 +58,10 @@ def test_what_is_no_motion_counts_as_no_intervention(found: object) -> None:
 
 def test_after_a_failure_the_next_policy_is_asked(case_a: Scenario) -> None:
     case_a.intervention.policies.insert(0, PolicyEntry("broken", {}))
+    case_a.duration_s = 16.0
     with POLICIES.adding("broken", Raises):
         of_run = simulate(case_a, "d")
-    assert "arrival" in kinds(of_run, "ugv1")
+    assert "proposal" in kinds(of_run, "ugv1")
     assert re.fullmatch(r"test_policies\.py:\d+ RuntimeError: no plan", of_run.meta["faults"][0]["what"])
 
 
@@ -83,8 +80,6 @@ def test_policies_that_cannot_be_made(name: str, parameters: dict[str, float], s
 
 
 class Hangs(Policy):
-    """A policy that never answers, and catches what it can."""
-
     def propose(self, seen: Observation) -> Motion | None:
         while True:
             try:
@@ -95,10 +90,10 @@ class Hangs(Policy):
 
 def test_a_policy_that_hangs_is_stopped_and_reported(case_a: Scenario) -> None:
     case_a.intervention.policies.insert(0, PolicyEntry("hangs", {}))
-    case_a.intervention.budget_s = 0.05
+    case_a.intervention.budget_s, case_a.duration_s = 0.05, 16.0
     with POLICIES.adding("hangs", Hangs):
         of_run = simulate(case_a, "d")
-    assert "arrival" in kinds(of_run, "ugv1")
+    assert "proposal" in kinds(of_run, "ugv1")
     assert "OutOfTime" in of_run.meta["faults"][0]["what"]
 
 
@@ -106,11 +101,10 @@ def test_a_policy_that_hangs_is_stopped_and_reported(case_a: Scenario) -> None:
 def test_the_ranking_decides_what_is_proposed_first(case_a: Scenario, ranking: str) -> None:
     wrong = PolicyEntry("towards", {"x_m": 4.0, "y_m": 7.0, "speed_m_s": 2.0})
     case_a.intervention.policies.insert(0, wrong)
-    case_a.intervention.ranking = ranking
+    case_a.intervention.ranking, case_a.duration_s = ranking, 16.0
     of_run = simulate(case_a, "d")
     first = next(event for event in of_run.events if event["kind"] == "proposal")
     assert first["policy"] == ("towards" if ranking == "listed" else "detour")
-    assert "arrival" in kinds(of_run, "ugv1")
 
 
 @pytest.mark.parametrize(

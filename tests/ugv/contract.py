@@ -22,8 +22,6 @@ USED = {name: make() for name, make in MAKERS.items()}
 
 @dataclass(frozen=True, eq=False)
 class Recording(Problem):
-    """A problem that remembers which plans were evaluated."""
-
     plans: list[Evaluation] = field(default_factory=list)
 
     @classmethod
@@ -36,12 +34,10 @@ class Recording(Problem):
 
 
 def same(one: Solution, other: Solution) -> bool:
-    """Equal to the last bit, arrays too."""
     return all(np.array_equal(a, b) for a, b in zip(vars(one).values(), vars(other).values(), strict=True))
 
 
 def check_contract(route: Route, problem: Problem, budget: Budget = DEFAULT) -> Solution:
-    """For a finite problem."""
     recording = Recording.of(problem)
     solution = route.solve(recording, budget)
     assert solution.status in get_args(Status)

@@ -64,8 +64,6 @@ def test_once_reversed_the_same_costs_do_not_reverse_an_answer_back(
 
 
 class Agreeing:
-    """A route that accepts everything."""
-
     status: Status = "optimal"
 
     def solve(self, problem: Problem, budget: Budget) -> Solution:
@@ -73,8 +71,6 @@ class Agreeing:
 
 
 class NotFinite(Agreeing):
-    """A route that says that the data are not finite."""
-
     status = "refused_not_finite"
 
 

@@ -20,7 +20,6 @@ Points = tuple[tuple[float, float], ...]
 
 
 def situation(*discs: tuple[float, float], speed: float = 1.0, max_speed: float = 3.0) -> View:
-    """A UGV at the origin that is to go to (8, 0), and discs of 2 m."""
     preset = Motion.at_speed(np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]]), speed)
     still, one, nobody = balls([[x, y, 0.0] for x, y in discs]), np.ones(len(discs)), np.zeros((0, 3))
     return View(0.0, np.zeros(3), preset, still, still[:0], nobody, nobody, 2.0 * one, one, max_speed)
@@ -36,7 +35,6 @@ AWAY = Motion.at_speed(np.array([[4.0, 0.0, 0.0], [4.0, 9.0, 0.0]]), 2.0)
 
 
 def beside(asked: tuple[Motion, bool] | None) -> View:
-    """Another robot stands on the way of the UGV."""
     place, point = np.array([[4.0, 0.0, 0.0]]), balls(np.zeros(3))
     moving = {"parts": point, "places": place, "velocities": 0.0 * place, "asked": (asked,)}
     return replace(situation(), **moving, distances=np.array([2.0]), shares=np.array([0.5]))

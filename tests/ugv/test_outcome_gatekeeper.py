@@ -76,7 +76,6 @@ def test_a_favour_is_done_unless_it_strands_the_ugv() -> None:
 
 
 def making_way(number: int, cause: str = "other") -> Proposal:
-    """One that "ugv" accepts as a favour to the other; with any other cause it makes no difference."""
     return Proposal("way", 0.05 * number, STAYS, cause=cause, number=number)
 
 

@@ -11,7 +11,6 @@ from airground_drake.model.geometry.encounter import least_apart
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 60), st.integers(1, 4), st.booleans())
 def test_nothing_nearer_is_passed_over(seed: int, places: int, corners: int, planar: bool) -> None:
-    """Ways of long and short steps, level and not, that stand still for a while, beside points, walls and prisms."""
     rng = np.random.default_rng(seed)
     steps = rng.normal(size=(places, 3)) * rng.choice([0.02, 0.5], size=(places, 1))
     way = 2.0 * rng.normal(size=3) + np.cumsum(steps, axis=0)

@@ -19,7 +19,6 @@ TRIANGLE = outline.prism([[0.0, 0.0], [2.0, 0.0], [0.0, 1.0]], base=0.5, top=2.0
 
 
 def distances(rows: Array, some: Array, *, planar: bool) -> Array:
-    """Of places (n, 3), m, from the cores of outlines (m, W): (n, m), m."""
     return away_from(Cores.of(rows), some[:, None], planar=planar).distance
 
 

@@ -88,7 +88,6 @@ def test_known_lengths(
     start: Point, goal: Point, rows: Array, keep: float | list[float], length: float, few: int,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    """All obstacles at once, or only those that a path runs into."""
     monkeypatch.setattr(paths, "FEW", few)
     assert length_or_inf(start, goal, rows, np.broadcast_to(keep, len(rows))) == pytest.approx(length, abs=1e-7)
 
@@ -162,7 +161,6 @@ def test_what_separates_two_places(rows: list[Array], apart: bool) -> None:
 @examples(60)
 @given(st.lists(OUTLINES, max_size=12), st.integers(1, 30), st.integers(0, 99))
 def test_looking_up_outlines_changes_nothing(drawn: list[Array], count: int, seed: int) -> None:
-    """Points and segments all at once, in cells, are judged as one at a time."""
     rows = outline.stacked(drawn)
     rng, keep = np.random.default_rng(seed), np.resize([0.25, 0.5, 1.0], len(rows))
     begin = np.round(4.0 * rng.uniform(-2.0, 12.0, (count, 2))) / 4.0
@@ -229,7 +227,6 @@ def test_a_distance_field_knows_no_way_through_closed_walls_and_bears_walls_far_
 @examples(60)
 @given(st.lists(OUTLINES, max_size=8), st.lists(OUTLINES, max_size=8), st.sampled_from([0.0, 0.4, -0.4, 3.0]))
 def test_what_is_among_others(one: list[Array], other: list[Array], shift: float) -> None:
-    """All pairs are compared, number by number."""
     rows, others = outline.stacked(one), outline.stacked(other) + shift * outline.SAME_M
     both = outline.joined(rows, others)[:, outline.BASE :]
     same = np.abs(both[: len(rows), None] - both[len(rows) :]).max(axis=2) <= outline.SAME_M
@@ -239,7 +236,6 @@ def test_what_is_among_others(one: list[Array], other: list[Array], shift: float
 @examples(30, fuzz=2000)
 @given(point, point, fields(12))
 def test_circles_that_others_cover_change_no_path(start: Point, goal: Point, field: tuple[Array, Array]) -> None:
-    """Bit by bit, with all circles in the graph and without those that are covered."""
     found = []
     for looked_at in (True, False):
         with pytest.MonkeyPatch.context() as patch:

@@ -48,7 +48,6 @@ def test_numbers_that_mean_nothing_are_refused(given: tuple[float, ...]) -> None
 
 
 def closest(position: np.ndarray, velocity: np.ndarray, centre: np.ndarray, other: np.ndarray, h: float) -> float:
-    """Exact minimum distance between two points in uniform motion over one period."""
     x, v = position - centre, (velocity - other) * h
     s = 0.0 if v @ v == 0 else float(np.clip(-(x @ v) / (v @ v), 0, 1))
     return float(np.linalg.norm(x + s * v))
@@ -87,7 +86,6 @@ def attack(seed: int, steps: int, avoidance: Avoidance, *, share: float | None =
 @examples(60, fuzz=2000)
 @given(SEEDS, st.sampled_from([0.01, 0.05, 0.2]), st.sampled_from([0.0, 0.01, 1.0, 5.0]))
 def test_no_velocity_breaks_the_safe_distance_in_continuous_time(seed: int, h: float, largest: float) -> None:
-    """Of bodies of any size: both radii more."""
     assert attack(seed, 50, Avoidance(gain=3.0, period=h), largest=largest) >= (-1e-9 if largest else -1e-12)
 
 
@@ -137,3 +135,12 @@ def test_a_robot_between_two_obstacles_is_not_driven_into_either() -> None:
         position = position + 0.05 * avoidance.apply(np.array([[10.0, 0.0, 0.0]]), spaces)
         assert np.linalg.norm(position - obstacles[0], axis=1).min() >= 1.4 - 1e-9
     assert abs(position[0, 0]) < 1e-3
+
+
+@pytest.mark.parametrize("value", [np.nan, -np.inf, -1e300])
+def test_a_velocity_that_is_no_number_does_not_lead_inside(value: float) -> None:
+    layer = Avoidance(3.0, 0.05, 5.0)
+    one, robot = np.ones((1, 1)), np.array([[2.0, 0.0, 0.0]])
+    spaces = layer.half_spaces(*among_points(robot, np.zeros((1, 1, 3)), D * one, one, np.ones((1, 3))))
+    velocity = layer.apply(np.array([[value, 0.0, 0.0]]), spaces)
+    assert not np.isfinite(velocity).all() or spaces.normal[0, 0] @ velocity[0] >= spaces.bound[0, 0]

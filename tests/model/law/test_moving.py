@@ -24,7 +24,6 @@ SHAPES = {
 
 
 def beside(shape: Array, speed: float, count: int = 2, walls: Array | None = None) -> World:
-    """UGVs without a body, an idle UAV, and an obstacle that may move at this speed, m/s."""
     team, rows = world(count, ugv_m=0.2, max_speed=LIMIT), shape.copy()
     rows[:, outline.SPEED] = speed
     script = Scripted(Motion(np.zeros(1), np.zeros((1, 3))))

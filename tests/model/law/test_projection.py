@@ -29,7 +29,6 @@ def dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
 
 
 def solved(matrix: Sequence[Row], right: Row) -> Row | None:
-    """The solution of linear equations by elimination; None unless there is exactly one."""
     rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
     count = len(rows[0]) - 1
     for i in range(count):
@@ -82,7 +81,6 @@ def law(lower: Array, normal: Array, bound: Array) -> Array | None:
 @examples(60, fuzz=1000)
 @given(SEEDS)
 def test_the_command_of_any_team_is_the_closest_allowed_velocity(seed: int) -> None:
-    """UGVs and a UAV, many of them in contact with obstacles or each other."""
     team, positions = scene(seed, robots=3, obstacles=4)
     rng = np.random.default_rng(seed)
     positions[1, :2] = positions[0, :2] + rng.normal(size=2)  # inside each other's safe distance at times

@@ -24,7 +24,6 @@ CAR = "{kind: ackermann, hand_point_m: 0.3, wheelbase_m: 0.3, max_steering_rad: 
 
 
 def passing(*more: str) -> Trace:
-    """A run past a rock that stands a little aside."""
     given_ = [f"ugvs.ugv1.plant={CAR}", "ugvs.ugv1.max_speed_m_s=1.4", "uav.altitude_m=3", "uav.start_m=[0, 0, 3]"]
     given_ += ["uav.target_m=[10, 0, 3]", "obstacles.rock.position_m=[5.0, 1.9, 0.0]", "duration_s=15.0", *more]
     return simulate(load("minimal", given_), "d")
@@ -67,7 +66,6 @@ def test_a_car_stands_where_it_would_have_to_turn_on_the_spot() -> None:
 
 
 def test_a_command_outside_makes_it_stand() -> None:
-    """Where another task comes before the law's inequalities, as under method (b)."""
     plant = Ackermann(0.3, H, backwards=False, radius_m=1.0)
     for command, stands in (([1.0, 0.29, 0.0], False), ([1.0, 0.31, 0.0], True), ([-1.0, 0.0, 0.0], True)):
         velocity = np.array(command)

@@ -41,7 +41,6 @@ DELAYED_LAG = "[{kind: delay, delay_s: 0.1}, {kind: lag, time_constant_s: 0.1}]"
 
 
 def commands(seed: int, speed: float) -> Array:
-    """Commands in the plane of up to a speed, half of them at it, (K, 3), m/s."""
     rng = np.random.default_rng(seed)
     turn, fast = rng.uniform(-np.pi, np.pi, 12), rng.uniform(0.0, 2.0, 12).clip(max=1.0) * speed
     return np.column_stack([fast * np.cos(turn), fast * np.sin(turn), np.zeros(12)])
@@ -180,14 +179,12 @@ def test_the_checker_has_the_same_distances_in_other_words(
 
 
 def run_of(plant: str, *more: str) -> Trace:
-    """A run past the rock, under method (d)."""
     given_ = [f"ugvs.ugv1.plant={plant}", "ugvs.ugv1.max_speed_m_s=1.4", "uav.altitude_m=3", "uav.start_m=[0, 0, 3]"]
     return simulate(load("minimal", [*given_, "uav.target_m=[10, 0, 3]", "duration_s=12.0", *more]), "d")
 
 
 @pytest.mark.parametrize("plant", [UNICYCLE, FORWARDS, LAG, DELAYED_LAG])
 def test_a_run_keeps_its_distances_and_meets_the_hypotheses(plant: str) -> None:
-    """The least gap is no more than that of finely sampled bodies, which follow from the equations."""
     trace = run_of(plant)
     found = {verdict.claim.id: verdict for verdict in judge(trace)}
     assert {name for name, verdict in found.items() if verdict.status not in ("holds",)} <= {"LIVE-GOAL"}

@@ -79,7 +79,6 @@ def test_transitions(trigger: Trigger, before: tuple, t: float, x: float, after:
 
 @given(st.lists(st.floats(-1.0, 5.0), min_size=1, max_size=200), st.floats(0.0, 2.0), st.floats(0.01, 0.5))
 def test_triggers_are_never_closer_than_the_dwell(samples: list[float], dwell: float, dt: float) -> None:
-    """Any signal, sampled; at or above the threshold at the start triggers at once."""
     trigger = Trigger(3.0, 1.5, dwell)
     state = trigger.start(0.0, samples[0])
     assert state.triggers == (samples[0] >= 3.0)

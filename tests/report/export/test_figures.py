@@ -25,7 +25,6 @@ REPORT = Report.model_construct(
 
 
 def written(folder: Path, style: str, formats: Sequence[str]) -> dict[str, bytes]:
-    """The files by name."""
     trace = make_trace(make_scenario(), "c", GOING_ROUND, SUCCESS)
     folder.mkdir()
     paths = list(figures.write(REPORT, make_scenario(), {"c": trace}, folder, style, formats))

@@ -28,7 +28,6 @@ REPORT = Report.model_construct(
 
 
 def rows(table: str) -> list[list[str]]:
-    """Cells of the rows below the head."""
     body = table.split("\\midrule\n")[1].split("\\bottomrule")[0]
     return [[cell.strip() for cell in re.split(r"(?<!\\)&", line.removesuffix(" \\\\"))] for line in body.splitlines()]
 

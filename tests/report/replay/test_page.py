@@ -40,21 +40,6 @@ def test_names_are_escaped(scene: Scene) -> None:
     assert HOSTILE not in pages.page(hostile)
 
 
-def test_only_frames_that_change_something_are_kept(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> None:
-    kept: list[int] = []
-
-    class Counting(MeshcatAnimation):  # type: ignore[misc]
-        def SetTransform(self, frame: int, *rest: object) -> None:
-            kept.append(frame)
-
-    monkeypatch.setattr(pages, "MeshcatAnimation", Counting)
-    monkeypatch.setattr(Meshcat, "SetAnimation", lambda *_: None)
-    pages.recorded(replace(scene, robots=scene.robots[:1], proposals=()))
-    corners = 9  # of the path, each between two frames
-    assert 2 <= len(kept) <= 3 * corners
-    assert (kept[0], kept[-1]) == (0, len(scene.times_s) - 1)
-
-
 def test_nothing_is_drawn_where_a_body_was_not_recorded(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> None:
     """Its path has a part before the gap and one after it; in between the body is hidden, and does not move."""
     shown: dict[str, list[tuple[int, bool]]] = {}

@@ -38,15 +38,6 @@ def test_states(scene: Scene, trace: Trace, scenario: Scenario) -> None:
     assert {*scenes.scene(alone, scenario).robots[0].states} == {OWN, TRIGGERED}
 
 
-def test_safe_cylinders_and_robots_are_within_bounds(scene: Scene, scenario: Scenario) -> None:
-    assert {obstacle.safe_m[0] for obstacle in scene.barriers} == {scenario.safe_distance.obstacle_m}
-    aside = np.array([1.0, 1.0, 0.0])
-    around = [each.place_m + side * each.safe_m[0] * aside for each in scene.barriers for side in (-1.0, 1.0)]
-    every = np.concatenate([*(body.positions for body in scene.robots), around])
-    assert (every >= scene.low_m - 1e-12).all()
-    assert (every <= scene.high_m + 1e-12).all()
-
-
 def test_bodies_are_drawn_as_large_as_they_are(trace: Trace) -> None:
     wide = make_scenario()
     wide.obstacles["obstacle_1"].radius_m, wide.ugvs["ugv2"].radius_m = 1.5, 1.25
@@ -54,12 +45,3 @@ def test_bodies_are_drawn_as_large_as_they_are(trace: Trace) -> None:
     assert (made.barriers[0].radius_m, made.barriers[0].safe_m) == (1.5, wide.safe_distance.obstacle_m + 1.5)
     assert [body.radius_m for body in made.robots] == [made.mark_m, 1.25, made.mark_m]
     assert made.mark_m > 0.0
-
-
-def test_points_that_keep_their_safe_distance_are_drawn_apart(trace: Trace, scenario: Scenario) -> None:
-    """Also in a scene so large that a point is small in it."""
-    far = replace(trace, states=trace.states.assign(**{"uav.x_m": trace.states["uav.x_m"] + 120.0}))
-    made = scenes.scene(far, scenario)
-    assert (made.high_m - made.low_m).max() > 100.0
-    radii = [*(body.radius_m for body in made.robots), *(each.radius_m[0] for each in made.barriers)]
-    assert 2.0 * max(radii) < scenario.safe_distance.obstacle_m

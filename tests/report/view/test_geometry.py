@@ -1,7 +1,6 @@
 """Bands, grids and cameras."""
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -64,14 +63,3 @@ def test_prisms_have_the_area_of_their_tops_and_sides() -> None:
     assert normals[:3, 2].min() > 0.0  # tops come first, and look upwards
     middle = (a + b + c).T / 3.0 - np.where((a[0] < 4.0)[:, None], [1.0, 1.0, 0.0], [6.0, 1.3, 0.0])
     assert ((normals * middle)[3:, :2].sum(axis=1) > 0.0).all()  # sides look outwards
-
-
-def test_edges_inside_of_another_polygon_are_left_out() -> None:
-    other = SQUARE + 1.0
-
-    def inside(points: Array) -> npt.NDArray[np.bool_]:
-        return np.any([((each[0] < points) & (points < each[2])).all(axis=1) for each in (SQUARE, other)], axis=0)
-
-    ends = geometry.outer_edges([SQUARE, other], inside, 0.01)
-    assert np.linalg.norm(ends[1] - ends[0], axis=1).sum() == pytest.approx(12.0, abs=0.05)
-    assert np.linalg.norm(ends[1] - ends[0], axis=1).max() <= 0.01 + 1e-12

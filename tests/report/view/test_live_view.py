@@ -12,13 +12,11 @@ from airground_drake.sim.simulation import simulate
 
 
 def place(meshcat: Meshcat, k: int) -> list[float]:
-    """Where robot k stands in the Meshcat."""
     matrix = msgpack.unpackb(meshcat._GetPackedTransform(robot_path(k)))["matrix"]
     return matrix[12:15]
 
 
 def shown(meshcat: Meshcat, k: int) -> list[bool]:
-    """Whether UGV k is visible as it looks in each state."""
     paths = [state_path(k, state) for state in range(len(STATES))]
     return [msgpack.unpackb(meshcat._GetPackedProperty(path, "visible"))["value"] for path in paths]
 

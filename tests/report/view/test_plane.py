@@ -47,14 +47,12 @@ BENT = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [1.0, 4.0]]
 
 
 def turned(corners: Sequence[Sequence[float]], place: Sequence[float], heading: float) -> Array:
-    """Corners (n, 2), m, turned about the origin and moved."""
     across = np.array(corners) @ [1.0, 1.0j]
     there = complex(*place) + across * np.exp(1j * heading)
     return np.column_stack([there.real, there.imag])
 
 
 def beyond(point: Array, corners: Array, *, closed: bool) -> float:
-    """Distance of a point from a way along corners (n, 2), m; minus that inside of a closed one."""
     ends = np.roll(corners, -1, axis=0) if closed else np.concatenate([corners[1:], corners[-1:]])
     crossed = 0
     least = np.inf
@@ -120,16 +118,6 @@ def walls(count: int) -> Scenario:
         f"wall_{k}": Obstacle([3.0 * k, 0.0, 0.0], polygon_m=ELL, known_to_uav=k % 2 == 0) for k in range(count)
     }
     return scenario
-
-
-def test_a_wall_of_many_parts_has_its_name_once_inside_of_it() -> None:
-    scenario = walls(1)
-    scenario.obstacles["bent"] = Obstacle(segment_m=BENT)
-    (ell, bent), edges = draw_barriers(Figure().subplots(), scenario)
-    assert (ell.text, bent.text) == ("wall_0", "bent")
-    assert beyond(ell.at[:2], np.array(ELL), closed=True) < -0.5
-    assert beyond(bent.at[:2], np.array(BENT), closed=False) < 1e-9
-    assert len(edges) >= 4
 
 
 def test_what_moves_is_drawn_with_its_way_and_a_word_or_left_to_others() -> None:

@@ -1,15 +1,9 @@
 """What a stage has of walls: how large they are drawn, where they end, and what of the arena."""
 
-from collections.abc import Callable
-from typing import cast
-
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat
-from pydrake.math import RigidTransform
 from report.cases import make_scenario
 
-from airground_drake.base.arrays import Array
 from airground_drake.report.view.draw import barrier_path, draw, served
 from airground_drake.report.view.stage import HIGHEST, Barrier, arena_of, barriers_of, stage
 from airground_drake.scenario.schema import Moves, Obstacle, Scenario
@@ -43,21 +37,6 @@ def test_the_rim_goes_once_round_all_parts_together() -> None:
     assert length(box) == pytest.approx(6.0 + 2.0 * np.pi * (own + 0.25), rel=0.02)
 
 
-def test_points_and_thin_walls_are_thick_enough_to_be_seen_and_all_else_is_as_large_as_it_is() -> None:
-    made = stage(
-        scenario_with(
-            point=Obstacle([0.0, 0.0, 0.0]),
-            wall=Obstacle(segment_m=U),
-            thick=Obstacle(segment_m=U, radius_m=2.0),
-            box=Obstacle([0.0, 0.0, 0.0], size_m=[2.0, 1.0]),
-        )
-    )
-    point, wall, thick, box = made.barriers
-    assert point.radius_m == made.mark_m > wall.radius_m.max() == wall.radius_m.min() > 0.0
-    assert (thick.radius_m.tolist(), box.radius_m.tolist()) == ([2.0] * 3, [0.0])
-    assert {tuple(corner) for corner in box.body[0].tolist()} == {(-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)}
-
-
 def test_a_stage_holds_walls_to_their_tops_if_these_are_no_higher_than_twice_a_robot() -> None:
     low = stage(scenario_with(box=Obstacle([50.0, 0.0, 0.0], size_m=[2.0, 40.0], height_m=3.5)))
     away = make_scenario().safe_distance.obstacle_m
@@ -86,34 +65,6 @@ def test_an_arena_is_a_frame_and_the_one_that_surfaces_keep_to_and_no_barrier() 
     made = stage(scenario)
     assert [each.name for each in made.barriers] == ["rock"]
     assert (made.low_m[:2].tolist(), made.high_m[:2].tolist()) == ([-10.0, -20.0], [30.0, 40.0])
-
-
-class Told:
-    """In place of a Meshcat: what is asked of it, by path."""
-
-    def __init__(self) -> None:
-        self.vertices: dict[str, Array] = {}
-        self.places: dict[str, Array] = {}
-
-    def SetTriangleMesh(self, path: str, vertices: Array, *_: object) -> None:
-        self.vertices[path] = vertices.T
-
-    def SetTransform(self, path: str, transform: RigidTransform) -> None:
-        self.places[path] = transform.translation()
-
-    def __getattr__(self, name: str) -> Callable[..., None]:
-        return lambda *_: None
-
-
-def test_meshcat_has_each_wall_at_a_place_in_it_where_the_page_writes_its_name() -> None:
-    told = Told()
-    made = stage(scenario_with(box=Obstacle([9.0, 8.0, 0.0], size_m=[2.0, 1.0], heading_rad=0.4, height_m=1.5)))
-    draw(cast("Meshcat", told), made)
-    path = f"{barrier_path(0)}/body"
-    assert told.places[path].tolist() == pytest.approx([9.0, 8.0, 0.0])
-    there = told.vertices[path] + told.places[path]
-    assert {*there[:, 2]} == {0.0, 1.5}
-    assert there[:4, :2] == pytest.approx(made.barriers[0].body[0])
 
 
 def test_meshcat_takes_walls_posts_and_an_arena() -> None:

@@ -26,7 +26,6 @@ def row(index: int) -> Row:
 
 
 def draw_50_first(work: Callable[[int], Any], items: Iterable[int]) -> Iterator[tuple[int, Any]]:
-    """A pool in which draw 50 and those after it end before the first."""
     for index in sorted(items, key=lambda index: (index < 50, index)):
         yield index, [row(index)]
 

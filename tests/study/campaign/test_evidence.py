@@ -15,14 +15,9 @@ from airground_drake.study.campaign.conduct import InOrder, Stopping
 from airground_drake.study.campaign.evidence import evidence
 from airground_drake.study.campaign.page import page, told
 from airground_drake.study.campaign.rows import (
-    BATCH,
-    BOTH,
-    CLOCK,
     COLUMNS,
-    DRAKE,
     INVALID,
     JUDGED,
-    SCREENED,
     STOPPED,
     Row,
     blank,
@@ -59,12 +54,10 @@ def counts(claim: dict[str, Any]) -> list[int]:
 
 
 def shown(found: dict[str, Any]) -> str:
-    """The page, without its figures."""
     return page(found, pd.DataFrame(columns=list(COLUMNS)))
 
 
 def word(found: dict[str, Any]) -> tuple[str, str]:
-    """How the banner of the page looks, and what it says."""
     banner = re.search(r'<p class="headline (\w+)">(.*?)</p>', shown(found), re.DOTALL)
     assert banner is not None
     return banner[1], " ".join(re.sub(r"<[^>]*>", " ", banner[2]).split())
@@ -182,37 +175,12 @@ def test_the_page_says_first_what_was_found_and_what_separates_failures() -> Non
     assert not re.search(r'<script|<img|<b>|(?:src|href)="(?!#)', text)
 
 
-def test_it_says_who_made_and_judged_the_runs() -> None:
-    made_by = [SCREENED, SCREENED, BATCH, BOTH, DRAKE, CLOCK]
-    found = conclude([row(index, engine=engine) for index, engine in enumerate(made_by)])
-    assert found["engines"] == {**dict.fromkeys(made_by, 1), SCREENED: 2}
-    assert [entry["index"] for entry in found["by_drake"]] == [3, 4]
-    for said in (
-        "Drake made 1 of these runs; the compiled loop made 5, and Drake 1 of them again, bit by bit the same;",
-        "array judges screened 2 of them without a trace, which proves nothing; the others were judged by their traces",
-        "1 are not compared, because a policy met its limit of time by the clock.",
-    ):
-        assert said in shown(found)
-
-
 def test_without_independent_draws_there_is_no_interval() -> None:
     found = conclude([row(i) for i in range(9)], dependent=["ugvs.u.start_m"])
     (claim,) = found["claims"]
     assert (claim["tested"], claim["fixed"], claim["anytime"]) == (9, None, None)
     assert "come from a Halton sequence or a grid:\n<code>ugvs.u.start_m</code>.</p>" in shown(found)
     assert _summary(found, looked=False).endswith("no intervals: draws are not independent (ugvs.u.start_m)")
-
-
-def test_the_summary_says_what_is_undecided_and_gives_anytime_bounds_after_a_look() -> None:
-    rows = [row(0), row(7, "inconclusive"), row(1, claim="LIVE-HYP", exercised=0.0, as_expected=False), *died(2)]
-    said = [line for line in _summary(conclude(rows), looked=False).splitlines() if "undecided" in line]
-    assert said == ["  undecided: 1 of 4 draws died",
-                    "  undecided: SAFE-TRACE in run d: 2 of 3 runs, such as draw 7"]  # fmt: skip
-    said = _summary(conclude(rows[2:3]), looked=False).splitlines()
-    assert said[-1] == "  undecided: LIVE-HYP in run d: the scenario expects it to be tested, and no draw did"
-    found = conclude([row(i) for i in range(50)])
-    for looked, bound in ((False, clopper_pearson(0, 50)), (True, confidence_sequence(0, 50))):
-        assert f"violation 0 to {bound.high:.2g}" in _summary(found, looked=looked)
 
 
 def test_marks_are_found_in_distributions_and_no_draw_is_no_error() -> None:

@@ -9,7 +9,6 @@ import pytest
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.registry import SAMPLERS
 from airground_drake.scenario.load import from_data, load, resolved
-from airground_drake.study.campaign import shrink as module
 from airground_drake.study.campaign.falsification import Margin, Most
 from airground_drake.study.campaign.rows import JUDGED, Row, blank
 from airground_drake.study.campaign.search import Sampler
@@ -123,11 +122,3 @@ def test_shapes_become_plain_and_the_arena_goes() -> None:
     wall, bent = small["obstacles"]["wall"], small["obstacles"]["bent"]
     assert (len(wall["polygon_m"]), len(bent["segment_m"]), small["arena_m"]) == (3, 2, [])
     assert (wall["heading_rad"], wall["radius_m"], wall["height_m"]) == (0.0, 0.0, 2.0)
-
-
-def test_a_run_gets_no_shorter_than_a_control_period() -> None:
-    data = resolved(load("minimal"))
-    period = data["control"]["period_s"]
-    shorter = [each["duration_s"] for each in module._shorter(data | {"duration_s": 1.5 * period})]
-    assert shorter
-    assert min(shorter) >= period

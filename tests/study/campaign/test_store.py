@@ -23,7 +23,6 @@ def draw(index: int) -> list[Row]:
 
 
 def opened(folder: Path, *indices: int, resume: bool = True, **manifest: object) -> Store:
-    """A store with these draws in its journal."""
     store = Store(folder, MANIFEST | manifest, resume=resume and folder.exists())
     for index in indices:
         store.add(draw(index))

@@ -9,13 +9,12 @@ from study.campaign.test_evidence import row, stopped, table
 
 from airground_drake import judge, load, simulate, sweep
 from airground_drake.base.errors import ScenarioError, UnknownNameError
-from airground_drake.study.campaign.swept import by_value, drawing, per_run
+from airground_drake.study.campaign.swept import by_value, per_run
 
 KEY = "decision.threshold.zeta_m"
 
 
 def test_a_row_is_the_run_with_these_values() -> None:
-    """Each row is what `simulate` and `judge` say of the scenario with the row's values."""
     scenario = load("minimal", {"duration_s": 6.5})
     values: dict[str, list[Any]] = {KEY: [2.0, 4.0], "intervention.policies": [[], [{"name": "coordinate"}]]}
     found = sweep(scenario, values, runs=["d"], claims=["SAFE-TRACE", "THR-TRIG"])
@@ -51,7 +50,6 @@ def test_mistakes_are_named_and_impossible_values_have_a_row() -> None:
 
 
 def made() -> pd.DataFrame:
-    """Two values, two draws each and runs c and d; one run was stopped, and one draw has another order of rows."""
     rows = []
     for index in range(4):
         for run in "cd":
@@ -80,11 +78,3 @@ def test_runs_are_counted_by_value() -> None:
     assert (d["judged"], d["arrived"], d["arrival_s"]) == (2, 4, 12.0)
     assert d["claims"]["SAFE-TRACE"] == {"tested": 2, "refuted": 0, "undecided": 0, "margin": pytest.approx(0.1)}
     assert d["claims"]["THR-TRIG"] == {"tested": 0, "refuted": 0, "undecided": 0, "margin": None}
-
-
-@pytest.mark.parametrize("key", ["gain", "kind"])
-def test_every_kind_of_value_is_drawn(key: str) -> None:
-    text = drawing(by_value(per_run(made()), key), key, "name")
-    assert "least margin of SAFE-TRACE" in text
-    assert "run c" in text
-    assert "nan" not in text.lower()

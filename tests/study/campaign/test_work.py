@@ -153,7 +153,6 @@ def test_drake_makes_what_fails_again(spec: Spec, monkeypatch: pytest.MonkeyPatc
 
 
 def bug_in_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The gain of the UAV's task is off by one unit in the last place."""
     right = loop.advance
 
     def wrong(team: Team, *rest: Any) -> int:
@@ -173,7 +172,6 @@ def bug_in_a_leaf_system(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def bug_in_an_array_judge(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Robots seem 1 um farther apart than they are."""
     right = array_judges.least_of_pairs
     monkeypatch.setattr(array_judges, "least_of_pairs", lambda *given: right(*given) + 1e-6)
 

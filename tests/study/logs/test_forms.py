@@ -31,8 +31,6 @@ class Form(NamedTuple):
 def table(
     name: str, lines: Callable[[], list[list[str]]], delimiter: str = ",", above: str = ""
 ) -> Callable[[Path], Path]:
-    """Writes a table."""
-
     def write(folder: Path) -> Path:
         (folder / name).write_text(above + logs.text(lines(), delimiter))
         return folder / name
@@ -55,7 +53,6 @@ def planar() -> list[list[str]]:
 
 
 def sparse() -> list[list[str]]:
-    """A body a row, under the names of a ROS topic."""
     names = list(JITTER)
     head = ["__time", *(f"/{name}/odom/pose/pose/position/{axis}" for name in names for axis in "xyz")]
     lines = [head]
@@ -154,7 +151,6 @@ def twice() -> list[list[str]]:
 
 
 def own_clocks() -> list[list[str]]:
-    """Each body has its own times, which begin and end elsewhere and have another rate."""
     lines = [[f"{name}.{each}" for name in JITTER for each in ("t", "x", "y", "z")]]
     for k in range(max(len(t_s) for t_s, _ in JITTER.values())):
         own = (
@@ -232,7 +228,6 @@ def gazebo(folder: Path) -> Path:
 
 
 def captured(folder: Path) -> Path:
-    """Named poses of motion capture, with one header; a pose without a name is nobody's."""
     said = []
     for k, t in enumerate(FULL["uav"][0]):
         ns = EPOCH_NS + round(t * 1e9)
@@ -301,8 +296,6 @@ def humble(folder: Path) -> Path:
 
 
 def packed(of: Callable[[Path], Path]) -> Callable[[Path], Path]:
-    """As ROS 2 packs whole recordings."""
-
     def write(folder: Path) -> Path:
         path = of(folder)
         (folder / "packed").mkdir()
@@ -335,8 +328,6 @@ def turned(bodies: Motion, axes: str, names: Iterable[str] = ("tb_0", "tb_1", "u
 
 
 def per_file(bodies: Motion, name: str) -> Callable[[Path], Path]:
-    """A file per body."""
-
     def write(folder: Path) -> Path:
         for body in bodies:
             table(name.format(body), lambda body=body: logs.long({body: bodies[body]}))(folder)

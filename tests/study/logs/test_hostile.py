@@ -185,7 +185,6 @@ def test_other_encodings_and_line_ends_are_read(tmp_path: Path, document: dict[s
 
 
 def test_names_that_look_like_no_value_are_names(tmp_path: Path) -> None:
-    """A robot named NA is one."""
     given = logs.scenario()
     given["ugvs"] = {"NA": given["ugvs"]["tb_0"], "null": given["ugvs"]["tb_1"]}
     (tmp_path / "lab.yaml").write_text(yaml.safe_dump(given))

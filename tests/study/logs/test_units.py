@@ -22,7 +22,6 @@ def document(folder: Path, **more: Any) -> dict[str, Any]:
 
 
 def moved(bodies: Motion, **change: Callable[[Any, Any], tuple[Any, Any]]) -> Motion:
-    """The motion with times and places changed, of the bodies that are named, or of all."""
     return {name: change.get(name, change.get("all", lambda t, p: (t, p)))(*both) for name, both in bodies.items()}
 
 
@@ -34,17 +33,12 @@ def written(
 
 
 def least_m(path: Path, scenario: dict[str, Any], **choice: Any) -> tuple[float, list[str]]:
-    """Least distance of the broken pair, and the remarks."""
     found = logs.read(path, scenario, **choice)
     pairs = {(pair.first, pair.second): pair for pair in judge(found, scenario).pairs}
     return pairs[BROKEN].least_m, found.said
 
 
 RIGHT_M = logs.least_gaps(FULL)[BROKEN][0]
-
-
-def spaced(t: Any, p: Any) -> tuple[Any, Any]:
-    return 25.0 * t, p
 
 
 def offset(t: Any, p: Any) -> tuple[Any, Any]:
@@ -155,7 +149,6 @@ def test_axes_that_are_not_the_scenario_s_are_asked_for(
 
 
 def test_heights_alone_tell_y_up_where_starts_do_not(tmp_path: Path) -> None:
-    """The log begins on the way, in the frame of a camera."""
     aside = moved(logs.motion(("tb_0", "tb_1")), all=lambda t, p: up(t[20:], p[20:] + np.array([3.0, 1.0, 0.0])))
     turned = moved(aside, all=lambda t, p: (t, p[:, [2, 1, 0]]))
     for bodies, spans in ((aside, "0.7"), (turned, "1.92")):

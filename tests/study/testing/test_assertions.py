@@ -15,8 +15,6 @@ from airground_drake.verify.finding import Finding
 
 
 class Found(TraceClaim):
-    """FOUND: whatever finding it is made with."""
-
     id = "FOUND"
     statement = "All is well."
 
@@ -46,7 +44,6 @@ def test_claims_that_hold_pass(stuck: Trace) -> None:
 
 
 def test_a_refutation_says_who_when_and_what_was_needed(stuck: Trace) -> None:
-    """The rock must be kept away from by 3 m, it is said afterwards."""
     wider = replace(stuck, meta=changed(stuck.meta, {"scenario.safe_distance.obstacle_m": 3.0}))
     told = said(wider, "SAFE-TRACE", "LIVE-GOAL")
     assert "LIVE-GOAL is refuted, on run a of minimal (method a, seed 0)\n  claim: Every robot ended" in told

@@ -40,7 +40,6 @@ def distances(one: Array, other: Array) -> Array:
 def assert_keeps_distances(
     room: Space, tasks: list[RobotTask], found: Plan, speed: float, fixed: list[OtherRobot]
 ) -> None:
-    """From obstacles and from each other, radii included; less only where they begin or, of robots, end nearer."""
     ways = motions(found, tasks)
     for way, one in zip(ways, tasks, strict=True):
         assert way[0].tolist() == [0.0, *one.start]

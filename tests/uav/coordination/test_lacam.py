@@ -30,7 +30,6 @@ def line(a: tuple[float, float], b: tuple[float, float], step: float = 0.5) -> l
 
 
 def corridor(length: float, *, closed: bool) -> Space:
-    """A corridor in which two robots cannot pass each other, with one dead end or two."""
     discs = [*line((0, 0.7), (length, 0.7)), *line((0, -0.7), (length, -0.7)), *line((0, -0.7), (0, 0.7))]
     discs += line((length, -0.7), (length, 0.7)) if closed else []
     rows = balls([[*centre, 0.0] for centre in discs])
@@ -38,7 +37,6 @@ def corridor(length: float, *, closed: bool) -> Space:
 
 
 def dead_end(count: int) -> tuple[Space, list[RobotTask]]:
-    """Robots one behind the other that are to stand in the opposite order."""
     xs = [1.0 + 1.2 * k for k in range(count)]
     return corridor(1.2 * count + 2.4, closed=False), [task((x, 0), (y, 0)) for x, y in zip(xs, xs[::-1], strict=True)]
 

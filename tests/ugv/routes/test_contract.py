@@ -103,8 +103,6 @@ def test_no_route_finds_a_plan_below_the_bound_of_another() -> None:
 
 
 class Failed:
-    """A solver, and its result, without success."""
-
     def Solve(self, *arguments: object) -> Self:
         return self
 

@@ -76,7 +76,6 @@ def test_the_program_is_the_problem(blocks: int) -> None:
 
 
 def ending(found: SolverResult) -> MixedIntegerRoute:
-    """A route whose search ends like this."""
     route = MixedIntegerRoute()
     route._search.minimise = lambda *_: found  # type: ignore[method-assign]
     return route
@@ -191,7 +190,6 @@ class BranchAndBound:
 
 @pytest.fixture
 def gurobi(monkeypatch: pytest.MonkeyPatch) -> type[BranchAndBound]:
-    """What goes by this name is Drake's own branch and bound."""
     stand_in = type("StandIn", (BranchAndBound,), {})
     monkeypatch.setitem(drake_solvers.SOLVERS, "gurobi", stand_in)
     return stand_in
