@@ -77,7 +77,6 @@ class ProgressBar(Progress):
                 print(f"{seconds:8.2f} s  {what}", file=sys.stderr, flush=True)
 
     def close(self) -> None:
-        """End the current stage."""
         with self._lock:
             if self._bar is not None:
                 self._bar.close()
@@ -89,7 +88,6 @@ class ProgressBar(Progress):
 
 @contextmanager
 def progress_bar(*, quiet: bool = False, verbose: bool = False) -> Iterator[Progress]:
-    """Progress on standard error."""
     # On a terminal it is a bar, elsewhere one line for each stage that lasts longer than `TOLD_S`; with `quiet`
     # neither. With `verbose` it is a line for each part, beside the bar.
     terminal = sys.stderr.isatty()

@@ -257,7 +257,6 @@ METHODS: dict[str, Method] = {
 
 
 def method_of(name: str) -> Method:
-    """A method by its identifier."""
     if name not in METHODS:
         raise UnknownNameError("method", name, METHODS)
     return METHODS[name]

@@ -34,7 +34,6 @@ def output_folder(text: str) -> Path:
 
 
 def output_file(text: str) -> Path:
-    """Parse the path of an output that is one file."""
     if text.endswith("/"):
         raise argparse.ArgumentTypeError(f"{text!r} is a folder; wanted: the name of a file")
     return output_folder(text)

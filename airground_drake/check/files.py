@@ -49,7 +49,6 @@ def names_in(folder: Path) -> list[str]:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a regular file."""
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
         with os.fdopen(handle, "rb") as file:

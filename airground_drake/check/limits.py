@@ -45,7 +45,6 @@ def is_of_a_size(scenario: Json) -> None:
 
 
 def _numbers(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Each number of a JSON value, with its path."""
     if isinstance(value, (dict, list)):
         for key, part in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _numbers(part, (*path, str(key)))

@@ -74,7 +74,6 @@ def own_of(robot: Json) -> Json | None:
 
 
 def taken(robot: Json, control: Json) -> Taken:
-    """What the plants of a robot take."""
     most, period_s = float(robot["max_speed_m_s"]), float(control["period_s"])
     if own := own_of(robot):
         drift = float(own["drift_m_s"])

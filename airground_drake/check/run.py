@@ -71,12 +71,10 @@ class Run:
 
     @cached_property
     def presets(self) -> dict[str, Preset]:
-        """Preset trajectory of each UGV."""
         return {ugv: preset_of(self.scenario, ugv) for ugv in self.ugvs}
 
     @cached_property
     def levels(self) -> Levels:
-        """The trigger."""
         return levels_of(self.scenario)
 
     @cached_property

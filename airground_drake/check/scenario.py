@@ -97,7 +97,6 @@ def as_run(scenario: Json, name: str) -> Json:
 
 
 def uavs_of(scenario: Json) -> dict[str, Json]:
-    """Each UAV's part of the scenario, by name."""
     return scenario.get("uavs") or {scenario["uav"]["name"]: scenario["uav"]}
 
 
@@ -123,7 +122,6 @@ def barriers_of(scenario: Json) -> dict[str, Json]:
 
 
 def moving_of(scenario: Json) -> list[str]:
-    """Names of the obstacles that move."""
     return [name for name, body in scenario["obstacles"].items() if body["moves"]]
 
 

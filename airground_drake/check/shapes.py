@@ -169,7 +169,6 @@ def boxes_of(places: Array, steps: int = ROWS) -> tuple[Array, Array]:
 
 
 def shape_of(body: Json, *, endless: bool) -> Shape:
-    """The shape of an obstacle, by its entry in a scenario."""
     # endless: in height, as walls are for UGVs; balls are not.
     parts: Sequence[Sequence[Corner]]
     if "cells" in body:
@@ -198,7 +197,6 @@ def _of_map(cells: Json) -> list[list[Corner]]:
 
 
 def _placed(body: Json, corners: Sequence[Sequence[float]]) -> list[Corner]:
-    """Corners in the frame of a body, in the world frame."""
     x0, y0 = (body["position_m"] or (0.0, 0.0))[:2]
     cos, sin = math.cos(body["heading_rad"]), math.sin(body["heading_rad"])
     if x0 == y0 == body["heading_rad"] == 0.0:

@@ -58,7 +58,6 @@ class Variable:
 
 
 def decision_variable(run: Run, ugv: str) -> Variable:
-    """The decision variable from positions, preset and noise."""
     return _variable(run, ugv, run.column(f"{ugv}.noise_m"))
 
 
@@ -95,7 +94,6 @@ def _turning_points_s(t_s: Array, parts_m: Array) -> Array:
 
 
 def automaton(x: Variable, levels: Levels) -> list[Step]:
-    """Run the trigger on x."""
     # It triggers when x reaches zeta while supervising, also at t = 0; it releases when x falls below the release
     # level. A release before the dwell after the trigger is over leads to a rest until then, and a trigger at its end
     # if x is still at zeta or above.

@@ -49,7 +49,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do a campaign, or one draw; the exit codes are in the help."""
     options = parser().parse_args(arguments)
     if options.only is not None and (options.resume or options.stop_when or options.number is not None):
         return refuse("--only is one draw alone: -n, --resume and --stop-when do not go with it")

@@ -43,7 +43,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compare, and print what differs; the exit codes are in the help."""
     options = parser().parse_args(arguments)
     from airground_drake.report import model
 

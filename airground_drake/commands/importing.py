@@ -60,7 +60,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the scenario, with a map's files where it needs some; existing files are left alone."""
     options = parser().parse_args(arguments)
     for key in dict.fromkeys(key for theirs in FORMATS.values() for key in theirs):
         if getattr(options, key) is not None and key not in FORMATS[options.format]:

@@ -74,7 +74,6 @@ def parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Judge, and print the verdict; the exit codes are in the help."""
     options = parser().parse_args(arguments)
     from airground_drake.scenario.load import load, resolved
     from airground_drake.study.logs import judging, opening, tables, tracks, words

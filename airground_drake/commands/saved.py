@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 
 def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
-    """Return the runs of a report that have left a trace, or only the named run."""
     if not is_report(folder):
         raise FolderError(one_line(f"{folder} is not a report; allowed: a folder that `airground report` has written"))
     files.refuse_links(folder)

@@ -152,7 +152,6 @@ def _findings(before: Report, after: Report) -> Iterator[Change]:
 
 
 def _events(before: Report, after: Report) -> Iterator[Change]:
-    """Times of events, the first of a kind with the first, and so on."""
     for run in dict.fromkeys([*before.runs, *after.runs]):
         happened = (of.runs[run].events if run in of.runs else () for of in (before, after))
         old, new = (grouped(((event.robot, event.kind), event.t_s) for event in events) for events in happened)

@@ -161,7 +161,6 @@ class RunFacts:
 
     @property
     def there(self) -> int:
-        """How many UGVs arrived."""
         return len(self.home & {*self.ugvs})
 
     def way(self, robot: str) -> OnTheWay:
@@ -202,7 +201,6 @@ class RunFacts:
 
     @property
     def fates(self) -> Counter[str]:
-        """How many proposals are in each class."""
         return Counter(fate for _, fate in self._fates())
 
     @property

@@ -48,7 +48,6 @@ def held(folder: Path) -> Iterator[None]:
 
 
 def prepare(folder: Path) -> None:
-    """Create the folder if need be, see that a report may be written there, and remove what killed runs have left."""
     with files.wanted(folder, "a folder for the report"):
         folder.mkdir(parents=True, exist_ok=True)
         if why := _refused(folder):
@@ -77,7 +76,6 @@ def of_map(name: str) -> str:
 
 
 def is_report(folder: Path) -> bool:
-    """Whether there is a report.json of ours in a folder."""
     try:
         with open(files.open_regular(folder / PAGES["json"]), "rb") as file:
             beginning = min(

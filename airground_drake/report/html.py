@@ -267,7 +267,6 @@ def mathml(latex: str) -> Markup:
 
 
 def tables(evidence: Mapping[str, Any], caption: str) -> list[Table]:
-    """The evidence: first one table of single values, then one for each key that holds several records."""
     single = {key: value for key, value in evidence.items() if not _records(value)}
     rows = tuple((in_words(key), _cell(value)) for key, value in single.items())
     made = [Table(caption, ("quantity", "value"), rows[:MAX_ROWS])] if rows else []

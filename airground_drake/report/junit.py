@@ -12,7 +12,6 @@ _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def render(report: Report) -> str:
-    """JUnit XML of report.json: a suite per run, with a case per claim and per expected number."""
     # A claim whose status is the expected one passes; it is skipped, with the reason, if nothing put it to the test.
     # Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and a claim that
     # nobody checked are errors.

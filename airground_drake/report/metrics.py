@@ -297,7 +297,6 @@ def radius_m(trace: Trace, name: str) -> float:
 
 
 def _obstacles(trace: Trace) -> list[str]:
-    """The barriers that are there before the end."""
     return [name for name in trace.scenario.barriers if trace.there_from(name) < len(trace.t)]
 
 

@@ -254,7 +254,6 @@ class Report(Entry):
     audit: list[Finding]
 
     def about(self, *names: str) -> list[Claim]:
-        """The claims with these names."""
         return [claim for claim in self.claims if claim.id in names]
 
 

@@ -94,7 +94,6 @@ def off_script(trace: Any, scenario: Any) -> Iterator[Line]:
 
 
 def with_events(trace: Any) -> Any:
-    """The trace with the events that follow from its tables."""
     from airground_drake.sim.events import extract
 
     return replace(trace, meta=trace.meta | {"events": extract(trace)})
@@ -133,8 +132,6 @@ def document_again(report: Mapping[str, Any], scenario: Any, traces: Mapping[str
 
 
 def _without_claims(scenario: Mapping[str, Any]) -> dict[str, Any]:
-    """A resolved scenario without the claims that it adds, and without what it expects of them."""
-
     def expecting_less(part: Mapping[str, Any]) -> dict[str, Any]:
         expected = {name: value for name, value in part["expected"].items() if name not in scenario["claims"]}
         return {**part, "expected": expected}

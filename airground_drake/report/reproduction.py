@@ -270,7 +270,6 @@ def _evaluate(row: Reproduction, traces: Mapping[str, Trace]) -> tuple[list[floa
 
 
 def _scalar(values: list[float]) -> float | list[float] | None:
-    """One component as a number, several as a list, none as None."""
     return (values[0] if len(values) == 1 else list(values)) if values else None
 
 

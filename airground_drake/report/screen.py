@@ -65,7 +65,6 @@ class Row:
 
     @property
     def clause(self) -> tuple[str, str]:
-        """Its mark and words in the headline."""
         if self.facts is None:
             return "open", self.what
         there, ugvs = self.facts.there, len(self.facts.ugvs)

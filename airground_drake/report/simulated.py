@@ -55,7 +55,6 @@ def lines(folder: Path, *, allow_plugins: bool = False, progress: Progress = SIL
 
 
 def _other_versions(provenance: Mapping[str, Any]) -> str:
-    """A note on the libraries whose versions are others here."""
     here = versions()
     written = {"drake": provenance.get("drake")} | dict(provenance.get("packages") or {})
     other = [f"{name} {was}, here {here[name]}" for name, was in written.items() if here.get(name, was) != was]

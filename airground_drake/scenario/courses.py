@@ -28,5 +28,4 @@ def course(moves: Moves, period_s: float, until_s: float) -> Motion:
 
 
 def _periods(time_s: float, period_s: float) -> int:
-    """A time as a number of control periods, rounded up."""
     return math.ceil(time_s / period_s * (1.0 - PERIODS))

@@ -76,7 +76,6 @@ class _Bounded(Composer):
         self.sizes: dict[int, tuple[int, int]] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node:
-        """A node and those within it."""
         event: yaml.Event = self.peek_event()
         self.depth += 1
         if self.depth > MAX_DEPTH:
@@ -201,7 +200,6 @@ def simple(value: Any) -> Any:
 
 
 def replace(document: Document, override: str) -> None:
-    """Change a document by an override."""
     source = f"--set {short(override)}"
     key, equals, text = override.partition("=")
     if not equals or not key.strip():
@@ -309,7 +307,6 @@ def _entries_of(node: yaml.Node, key: str) -> Children:
 
 
 def _where(node: yaml.Node | yaml.Event) -> str:
-    """File and line of a node or of the event at its beginning."""
     mark: Any = node.start_mark
     return f"{mark.name}:{mark.line + 1}"
 

@@ -92,7 +92,6 @@ class Estimate(NamedTuple):
         )
 
     def __str__(self) -> str:
-        """In words, on one line."""
         return (
             f"{self.work:.2g} steps ({self.rows:.2g} rows, up to {self.decisions:.2g} decisions), "
             f"{self.memory / GIB:.2g} GiB"
@@ -109,7 +108,6 @@ def estimate(scenario: Scenario) -> Estimate:
 
 
 def within(scenario: Scenario, limits: Limits, times: int = 1) -> Estimate:
-    """The estimate of a validated scenario that keeps to the limits."""
     # limits: what it may ask for.
     once = estimate(scenario)
     total = Estimate._make([*(times * count for count in once[:-1]), once.memory])
@@ -142,7 +140,6 @@ def _of_run(scenario: Scenario, run: Run) -> Estimate:
 
 
 def _discs(scenario: Scenario) -> int:
-    """Obstacles and phantoms."""
     return len(scenario.obstacles) + sum(len(uav.phantoms_m) for uav in scenario.aerial.values())
 
 

@@ -181,7 +181,6 @@ class _Pace(NamedTuple):
 
 
 def _pace(sizes: Sizes, space: _Space, air_ground_m: float) -> _Pace:
-    """How fast robots are, and for how long."""
     # Rounding limits how far robots may go (`rounding.py`). For long ways the UAV is slower; if that does not suffice,
     # the run is shorter than needed.
     radius, distance = sizes.radius_m, sizes.distance_m

@@ -39,7 +39,6 @@ def text(*, installed: bool = True) -> str:
 
 
 def scenario_schema(*, installed: bool = True) -> Schema:
-    """The schema of a scenario file."""
     made = _adapted(TypeAdapter(schema.Scenario).json_schema(), installed)
     kinds = {name: _object(class_of(name), made["$defs"][name]) for name in sorted(made["$defs"])}
     top = _object(schema.Scenario, made)
@@ -48,7 +47,6 @@ def scenario_schema(*, installed: bool = True) -> Schema:
 
 
 def class_of(name: str) -> type:
-    """The dataclass of a definition."""
     return next((keys for keys in KEYS.values() if keys.__name__ == name), None) or getattr(schema, name)
 
 
@@ -71,7 +69,6 @@ def _adapted(part: Any, installed: bool) -> Any:
 
 
 def _expectations(claims: Registry, installed: bool) -> Schema:
-    """Expected verdicts by claim."""
     pattern = "^({0})( or ({0}))*$".format("|".join(EXPECTATIONS))
     verdict = {"anyOf": [{"enum": [*EXPECTATIONS, NOTHING]}, {"type": "string", "pattern": pattern}]}
     known: Schema = {name: {"description": claims.says(name), **verdict} for name in _adapted(claims, installed)}

@@ -27,7 +27,6 @@ class Section(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Its dotted key, and which kind it is about."""
         return f"{self.path}: {self.kind}" if self.kind else self.path
 
 

@@ -124,8 +124,6 @@ def one_of(options: Iterable[str], place: str = "") -> ValueRule:
 
 
 def registered(registry: Registry) -> ValueRule:
-    """A name of a registry, or a plug-in."""
-
     def check(value: str) -> str:
         if not registry.accepts(value):
             raise refused(value, f"one of {', '.join(registry.allowed)}{plugin_path(value)}")

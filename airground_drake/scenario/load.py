@@ -157,7 +157,6 @@ def own(scenario: Scenario, run: str) -> Scenario:
 
 
 def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenario:
-    """The scenario of a document with the values that a run sets."""
     changed = Document(simple(document.data), document.source, dict(document.places))
     try:
         for key, value in settings.items():
@@ -169,7 +168,6 @@ def _as_set(document: Document, run: str, settings: Mapping[str, Any]) -> Scenar
 
 
 def _checked(document: Document) -> Scenario:
-    """The scenario of a document, without the values that its runs set."""
     scenario: Scenario = filled(Scenario, document)
     _complete(scenario)
     _read_map(scenario, document)

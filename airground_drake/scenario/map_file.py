@@ -76,7 +76,6 @@ class MapFile(NamedTuple):
 
 
 def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
-    """The map of a map_server's YAML file."""
     data = _content(path, MAX_BYTES, where or str(path), "map.file" if where else "", "the YAML file of a map")
     try:
         document = parsed(data.decode("utf-8-sig"), str(path))

@@ -12,7 +12,6 @@ SMALL_M, NARROW_M = 0.5, 6.0
 
 
 def notes(scenario: Scenario) -> Iterator[str]:
-    """The notes on a valid scenario, each in one line."""
     for name, robot in scenario.robots.items():
         if hint := fast(robot.max_speed_m_s):
             yield f"{name} has max_speed_m_s = {robot.max_speed_m_s:g}{hint}"

@@ -62,7 +62,6 @@ def parser_of(
     epilog: str | None = None,
     exclusive: Collection[str] = (),
 ) -> Parser:
-    """The parser of a command."""
     # takes: its options and arguments, each with what it has otherwise than the table, None if nothing.
     # exclusive: options that exclude each other.
     form = argparse.RawDescriptionHelpFormatter if "\n" in (epilog or "") else argparse.HelpFormatter

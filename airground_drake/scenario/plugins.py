@@ -61,7 +61,6 @@ def digests(scenario: Scenario) -> dict[str, str]:
 
 
 def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None) -> None:
-    """Refuse third-party code."""
     # keys: keys to check; default: all.
     for key, name in plugins(scenario).items():
         if keys is None or key in keys:

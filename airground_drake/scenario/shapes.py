@@ -44,7 +44,6 @@ def corners_of_map(cells: MapCells) -> Array:
 
 
 def _placed(obstacle: Obstacle, corners: Sequence[Sequence[float]]) -> list[Corner]:
-    """Corners in the frame of an obstacle, in the world frame."""
     x0, y0 = obstacle.position_m[:2] or (0.0, 0.0)
     if not (x0 or y0 or obstacle.heading_rad):
         return [(x, y) for x, y in corners]
@@ -136,7 +135,6 @@ def _is_convex(corners: Sequence[Corner]) -> bool:
 
 
 def _triangles(corners: list[Corner]) -> list[tuple[Corner, Corner, Corner]]:
-    """Triangles that together are a polygon."""
     left, triangles = list(corners), []
     while len(left) > 3:
         points = np.array(left)

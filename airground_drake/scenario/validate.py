@@ -119,7 +119,6 @@ def _reserved(scenario: Scenario) -> Problems:
 
 
 def _map(scenario: Scenario) -> Problems:
-    """The rectangles of a map are in it."""
     if scenario.map is None or scenario.map.cells is None:
         return
     cells = scenario.map.cells
@@ -164,7 +163,6 @@ def _shapes(scenario: Scenario) -> Problems:
 
 
 def _way(key: str, obstacle: Obstacle, *, flat: bool) -> Problems:
-    """The way of an obstacle that moves."""
     moves = obstacle.moves
     if moves is None:
         if obstacle.known_motion:
@@ -364,7 +362,6 @@ Apart = tuple[str, float]  # a safe distance: its key, and its value, m
 
 
 def apart_of(scenario: Scenario, name: str) -> Apart:
-    """The distance to keep from an obstacle."""
     obstacle = scenario.barriers[name]
     if obstacle.distance_m:
         return f"{scenario.key_of(name)}.distance_m", obstacle.distance_m

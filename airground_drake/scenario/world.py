@@ -15,7 +15,6 @@ from airground_drake.scenario.schema import Obstacle, Scenario, Uav, Ugv
 
 
 def make_world(scenario: Scenario) -> World:
-    """All bodies of a scenario, and the distances that they keep."""
     safe = scenario.safe_distance
     control = scenario.control
     robots = [_robot(scenario, name, "ugv", ugv) for name, ugv in scenario.ugvs.items()]

@@ -41,14 +41,12 @@ ANSWERING_S = 0.15  # time that an answer may take besides its way, s
 
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
-    """The set-based avoidance layer."""
     control = scenario.control
     stands = scenario.position_error_m > 0.0
     return Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition, stands)
 
 
 def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:
-    """The control law of the UGVs under a method."""
     control, avoidance = scenario.control, make_avoidance(scenario, composition)
     return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
 
@@ -151,7 +149,6 @@ def make_map(scenario: Scenario, uav: Uav) -> tuple[Array, Array, Array]:
 
 
 def make_movers(scenario: Scenario) -> tuple[Mover, ...]:
-    """The obstacles that move."""
     period, until = scenario.control.period_s, scenario.duration_s
     return tuple(
         Mover(
@@ -176,12 +173,10 @@ def make_route(scenario: Scenario) -> Route:
 
 
 def make_presets(scenario: Scenario) -> list[Motion]:
-    """Preset trajectories of the UGVs."""
     return [Motion.at_speed(positions(ugv.preset.waypoints_m), ugv.preset.speed_m_s) for ugv in scenario.ugvs.values()]
 
 
 def make_horizon(scenario: Scenario) -> Horizon:
-    """The gatekeeper's grid and weights."""
     gate = scenario.gatekeeper
     substeps = round(gate.horizon_s / gate.stages / scenario.control.period_s)
     weights = gate.error_weight_1_m2_s, gate.slack_weight_1_m2_s, gate.terminal_weight_s

@@ -433,13 +433,11 @@ def _uav_controller(scenario: Scenario, world: World, name: str) -> UavControlle
 
 
 def _own_headings(world: World, plants: Mapping[str, System]) -> dict[str, OutputPort]:
-    """The headings of users' plants that have one, by robot."""
     own = [body.name for body in world.moving if body.plant and body.plant.measured]
     return {name: plants[name].GetOutputPort("heading") for name in own if plants[name].HasOutputPort("heading")}
 
 
 def _checked_block(n: int, block: System) -> System:
-    """The given block."""
     if not isinstance(block, System):
         raise PluginError(f"decision_block makes {short(repr(block))}; allowed: a System such as a DecisionBlock")
     sizes = {port.get_name(): port.size() for port in _outputs(block)}

@@ -62,7 +62,6 @@ _ID = re.compile(r' id="[^"]*"')
 
 
 def has_layers(diagram: Diagram) -> bool:
-    """Whether a diagram is that of a scenario."""
     return all(diagram.HasSubsystemNamed(layer) for layer in LAYERS)
 
 
@@ -143,7 +142,6 @@ def _edge(start: str, end: str, blocks: Mapping[str, System]) -> str:
 
 
 def svg(dot_text: str) -> str:
-    """Lay out Graphviz text as SVG."""
     # The same text gives the same bytes on the same machine; box sizes depend on its fonts. The picture holds the
     # digest of its text for `is_current`.
     picture = _PICTURE.search(re.sub(r"<!--.*?-->\n?", "", _laid_out(dot_text, "svg").decode(), flags=re.DOTALL))

@@ -62,7 +62,6 @@ class _Process:
         return by
 
     def trace(self) -> Trace:
-        """The trace of a run whose process has ended."""
         self.process.join()
         code = self.process.exitcode or 0
         self.process.close()

@@ -185,7 +185,6 @@ class Coordinate(Policy):
         return near or others
 
     def _alone(self, seen: Observation, space: Space, i: int) -> Way | None:
-        """The way that a UGV would have without other UGVs."""
         mate = seen.team[i]
         return plan(space, [task_of(mate, seen.start)], [self._pace(mate)], follow=self.follow).ways[0]
 

@@ -68,7 +68,6 @@ class PlannerState:
 
     @property
     def faults(self) -> list[Asked]:
-        """Failures of policies, in order."""
         return [asked for asked in self.asked if asked.what]
 
     @property
@@ -157,7 +156,6 @@ class Planner:
         return any(there[k] for k in self._rows.get(given, ()))
 
     def start(self) -> PlannerState:
-        """The memory at the beginning of a run."""
         return PlannerState((Negotiation(),) * len(self.ugvs))
 
     def asleep_until(
@@ -319,7 +317,6 @@ class Planner:
         *,
         learnt: bool,
     ) -> list[Negotiation]:
-        """Negotiations after the UGVs' answers."""
         # A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
         # its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
         # trajectory goes on: the others' ways were planned with it. Those that did not refuse are asked again at once.

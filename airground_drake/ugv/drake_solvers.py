@@ -43,7 +43,6 @@ class Minimiser:
     """The search for the optimum by one solver, with one thread; it holds the licence, if the solver needs one."""
 
     def __init__(self, name: str) -> None:
-        """Take the licence."""
         if why := lacking(name):
             raise ValueError(why)
         self._solver = SOLVERS[name]()

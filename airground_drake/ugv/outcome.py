@@ -74,7 +74,6 @@ class Outcome:
 
 
 def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tuple[Outcome, Outcome]:
-    """The outcomes of refusing and of accepting."""
     # seen: what the UGV knows; obstacles stand still, whatever their velocities.
     h, t, m = law.avoidance.period, seen.t, len(seen.still)
     look = replace(look, still=min(look.still, STILL_SHARE * seen.max_speed))

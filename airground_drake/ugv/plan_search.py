@@ -103,7 +103,6 @@ class _Beginnings(NamedTuple):
 
 @njit(cache=True)
 def _begin(terms: Terms, block: Blocks, plan: Array, before: _Beginnings) -> None:
-    """Write the sums of a plan."""
     before.shift[:] = 0.0
     for a in range(3):
         before.end[0, a] = terms.initial[a]

@@ -72,7 +72,6 @@ def _line(verdict: Verdict) -> str:
 
 
 def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plugins: bool) -> list[Verdict]:
-    """Verdicts on the claims wanted (none: all) that apply to the target."""
     # Third-party claims that a saved run names are imported only if they are wanted, and only if that is allowed.
     from airground_drake.scenario.load import from_data, load
     from airground_drake.sim import trace

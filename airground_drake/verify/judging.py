@@ -149,11 +149,9 @@ class _Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Shown as progress."""
         return f"{self.claim.id} {self.run}".strip()
 
     def verdict(self, scenario: Scenario, finding: Finding) -> Verdict:
-        """With what the scenario expects."""
         expected = scenario.runs[self.run].expected if self.run else scenario.expected
         due = expected.get(self.claim.id, self.claim.due(scenario.ugv_controller))
         return Verdict.of(self.claim, self.run, finding, due, self.inputs)

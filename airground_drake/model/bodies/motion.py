@@ -31,7 +31,6 @@ class PeriodMotion(NamedTuple):
         return places.min(axis=0) - self.off_m, places.max(axis=0) + self.off_m
 
     def least_distance(self) -> tuple[Array, Array]:
-        """The least distance from the origin."""
         # The squared distance is a convex parabola of the share s of the period that has passed. It is least at s =
         # clip(-start.w / ||w||^2, 0, 1) with w = end - start.
         # Returns a lower bound of the distance, (...,), m, exact if `off_m` is 0, and the first share of the period,

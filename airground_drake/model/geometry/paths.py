@@ -171,7 +171,6 @@ class _Obstacles:
 
     @cached_property
     def first(self) -> int:
-        """Index of the first wall or polygon."""
         return int((self.rows[:, COUNT] == 1.0).sum())
 
     @cached_property

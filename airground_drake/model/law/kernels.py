@@ -332,7 +332,6 @@ def _missed(velocity: Array, normal: Array, bound: Array, k: int) -> float:
 
 @njit(cache=True)
 def _squared(vectors: Array, k: int) -> float:
-    """Squared length of a row."""
     squared = 0.0
     for a in range(vectors.shape[1]):
         squared += vectors[k, a] ** 2

@@ -17,7 +17,6 @@ __all__ = ["of_runs", "whole"]
 
 
 def of_runs(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
-    """The findings that the runs of a report show."""
     return typeset(findings(scenario, traces))
 
 

@@ -45,7 +45,6 @@ class Believing(OutcomeGatekeepers):
 
     @classmethod
     def of(cls, scenario: Scenario, law: UgvLaw) -> Believing:
-        """Make them for a scenario."""
         return cls(make_world(scenario), law, make_presets(scenario), make_outlook(scenario), make_patience(scenario))
 
 

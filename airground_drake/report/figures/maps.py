@@ -108,7 +108,6 @@ def told(marks: Iterable[Mark]) -> str:
 
 
 def _at(trace: Trace, robot: str, t_s: float) -> Array:
-    """Where the body of a robot was, seen from above, (2,), m."""
     return np.array([np.interp(t_s, trace.t, axis) for axis in trace.body(robot)[:, :2].T])
 
 

@@ -45,7 +45,6 @@ class Figure:
 
 
 def panel(drawing: Drawing, name: str, title: str, says: str, heading: str, table: Table) -> Panel:
-    """A panel of a drawing; call it inside `canvas.style`."""
     # `name` is unique in the page; `title` and `says` are for readers who cannot see it.
     return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says), table, drawing)
 

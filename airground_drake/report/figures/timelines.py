@@ -145,7 +145,6 @@ class _Label(NamedTuple):
 
     @property
     def top(self) -> int:
-        """The line above it."""
         return self.line + self.text.count("\n") + 1
 
 

@@ -22,7 +22,6 @@ _ROUNDED = {"d", "points", "transform", "x", "y", "width", "height", "cx", "cy",
 
 
 def inline(svg: str, prefix: str, title: str, description: str, *, natural_size: bool = False) -> str:
-    """An SVG document as an element for HTML."""
     # Scripts, style sheets, handlers and references to anything outside the document are removed (a style sheet would
     # apply to the whole page), and attributes with which it could leave its place. Inline styles become attributes. Ids
     # get a prefix, so that several drawings can share a page; unused ids are removed. Coordinates are rounded to 0.01

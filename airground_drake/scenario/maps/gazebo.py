@@ -114,7 +114,6 @@ class _Reader:
         self.left_out += within
 
     def pose(self, of: ElementTree.Element) -> Pose:
-        """The pose that an element gives, or that of its frame."""
         given = of.find("pose")
         if given is None or not (given.text or "").strip():
             return Pose()
@@ -177,7 +176,6 @@ def _others(of: ElementTree.Element, *read: str) -> Iterator[str]:
 
 
 def _numbers(of: ElementTree.Element, count: int, source: str) -> tuple[float, ...]:
-    """The finite numbers in an element."""
     try:
         numbers = tuple(map(float, (of.text or "").split()))
     except ValueError:

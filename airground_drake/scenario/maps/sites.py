@@ -15,7 +15,6 @@ AROUND_M = 1.0
 
 
 def ways(grid: Grid, clearance_m: float, count: int) -> tuple[Array, float]:
-    """Starts and targets for some robots."""
     # Each next site is the one with the longest way from all sites before it; a start and its target are far apart.
     # Returns start and target of each robot, (count, 2, 2), m, and a length, m, that none of their shortest ways
     # exceeds.

@@ -150,7 +150,6 @@ class Batch:
 
     @property
     def database(self) -> BehaviourDatabase:
-        """The policies."""
         return self.planner.database
 
     def simulate(self, seed: int | None = None) -> Trace:
@@ -174,11 +173,9 @@ class Batch:
         return run
 
     def begin(self, seed: int | None = None) -> Going:
-        """A run at its initial state."""
         return Going(self, self.scenario.seed if seed is None else seed)
 
     def start(self) -> State:
-        """The state at the beginning of a run."""
         n, r, m = len(self.headings), len(self.world.robots), len(self.near.ugvs.still)
         due = int(self.team.due[0])
         return State(
@@ -202,7 +199,6 @@ class Batch:
         )
 
     def new_log(self, rows: int) -> Log:
-        """Room for so many rows."""
         n, r, moving = len(self.headings), len(self.world.robots), len(self.world.moving)
         signals = loop.SIGNALS * int((self.team.steering[:, 0] > 0.0).sum())
         widths = 3 * moving, 3 * r, 6 * n, n, n, FIELDS * n, n, signals, n * self.team.turns
@@ -213,7 +209,6 @@ class Going:
     """A run under way; `deepcopy` copies it, and both go on from there. Policies that remember in themselves do not."""
 
     def __init__(self, batch: Batch, seed: int) -> None:
-        """Begin a run of a scenario that is set up."""
         n = len(batch.headings)
         self._batch, self._seed = batch, seed
         self._team = batch.team._replace(draws=gaussians(seed, n, batch.draws))
@@ -268,17 +263,14 @@ class Going:
 
     @property
     def log(self) -> Log:
-        """The rows until now."""
         return Log(*(column[: self._state.counts[1]] for column in self._log))
 
     @property
     def memory(self) -> PlannerState:
-        """What the planner remembers."""
         return self._memory
 
     @property
     def decided(self) -> Sequence[GatekeeperDecision]:
-        """The decisions of the gatekeepers."""
         self._catch_up(int(self._state.counts[0]) - (self._state.counts[3] != 0))  # what is due is still to be made
         return self._answering.made
 
@@ -291,7 +283,6 @@ class Going:
         self._judged_to = tick
 
     def trace(self) -> Trace:
-        """The trace of the run until now."""
         batch, log = self._batch, self.log
         logged = {
             "bodies": log.bodies, "team_command": log.command, "reference": log.reference, "noise": log.noise,
@@ -430,7 +421,6 @@ def _with_end(holds: Array) -> Array:
 
 
 def _accepted(proposals: Sequence[Proposal | None]) -> Accepted:
-    """The motions of accepted proposals, for the loop."""
     motions = [None if proposal is None else proposal.motion for proposal in proposals]
     return Accepted(
         executing=np.array([proposal is not None for proposal in proposals]),

@@ -82,7 +82,6 @@ class Key:
 
     @property
     def choices(self) -> list[Any]:
-        """All values, if they are listed."""
         return self.given if self.kind in ("choice", GRID) else []
 
     def at(self, shares: Array) -> Any:
@@ -91,7 +90,6 @@ class Key:
 
 
 def made(kind: str, given: Any) -> Key:
-    """Make a key from the name of a kind and parameters."""
     try:
         if isinstance(given, list) and KINDS[kind].allows(*given):
             return Key(kind, given)
@@ -138,7 +136,6 @@ def combinations(drawn: Mapping[str, Key]) -> int:
 
 
 def stream(seed: int, key: str, index: int) -> np.random.Generator:
-    """The random numbers of one key in one draw."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(key.encode()), index)))
 
 

@@ -36,7 +36,6 @@ class Margin:
         return min((self._of(row) for row in rows if row["claim"] == self.claim), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
-        """Whether the claim is refuted."""
         return any(row["claim"] == self.claim and row["status"] == "refuted" for row in rows)
 
     def _of(self, row: Row) -> float:
@@ -57,7 +56,6 @@ class Most:
         return min((value for value in values if not math.isnan(value)), default=math.inf)
 
     def found(self, rows: Sequence[Row]) -> bool:
-        """Whether the limit is exceeded."""
         return self.value(rows) < -self.limit
 
     def _of(self, row: Row) -> float:

@@ -69,7 +69,6 @@ def told(result: Mapping[str, Any]) -> list[Line]:
 
 
 def made_by(engines: Mapping[str, int]) -> str:
-    """Who made the runs, in words."""
     screens, compared, clock = (engines.get(name, 0) for name in (SCREENED, BOTH, CLOCK))
     loop = screens + engines.get(BATCH, 0) + compared + clock
     said = [f"Drake made {engines[DRAKE]} of these runs"] if engines.get(DRAKE) else []

@@ -36,6 +36,5 @@ def is_tested(status: str, exercised: float) -> bool:
 
 
 def blank() -> Row:
-    """A row with empty values."""
     kinds: dict[str, Any] = {"int64": 0, "float64": float("nan"), "str": "", "bool": False}
     return {name: kinds[kind] for name, kind in COLUMNS.items()}

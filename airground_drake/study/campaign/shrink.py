@@ -46,7 +46,6 @@ def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
 
 
 def _without_entry(data: Json, path: tuple[str, ...]) -> Iterator[Json]:
-    """Leave out an entry of the list or mapping at a path."""
     entries = _at(data, path)
     for key in range(len(entries)) if isinstance(entries, list) else entries:
         smaller = copy.deepcopy(data)

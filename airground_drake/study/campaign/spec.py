@@ -247,7 +247,6 @@ def _unknown(source: str, key: str, name: str, allowed: Iterable[str]) -> Scenar
 
 
 def _identifier(name: str) -> str:
-    """The name of a campaign as an identifier, with which the names of its scenarios begin."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     return f"_{plain}" if plain[0].isdigit() else plain
 

@@ -268,7 +268,6 @@ def happened(loop: Batch, made: Going) -> Row:
 
 
 def happened_in(trace: Trace) -> Row:
-    """The same from a trace."""
     triggered = [event["t_s"] for event in trace.events if event["kind"] == "trigger"]
     arrivals = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
     intervened_s = [float(np.diff(trace.t) @ (trace.executing(ugv)[1:] >= 0)) for ugv in trace.ugvs]

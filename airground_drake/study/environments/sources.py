@@ -83,7 +83,6 @@ class Source:
         self._stage = lru_cache(MOST_STAGES)(partial(_stage, self._given, self._run))
 
     def drawn(self, rng: np.random.Generator) -> int:
-        """The number of an episode, drawn."""
         return int(self.numbers[int(rng.integers(len(self.numbers)))])
 
     def episode(self, number: int) -> Episode:
@@ -155,7 +154,6 @@ class Episodes:
         return self._begun().trace()
 
     def _begin(self, rng: np.random.Generator, options: Mapping[str, Any] | None) -> Episode:
-        """Begin the episode with the number in the options, or a drawn one."""
         if unknown := [repr(name) for name in options or {} if name not in ("number", *self._ignored)]:
             raise ValueError(f"unknown options of reset: {', '.join(unknown)}; allowed: 'number'")
         number = (options or {}).get("number")
@@ -173,7 +171,6 @@ class Episodes:
         return self._episode
 
     def _going_on(self) -> Episode:
-        """The episode of a step."""
         episode = self._begun()
         if self._over:
             raise RuntimeError("the episode is over: call reset")
@@ -181,7 +178,6 @@ class Episodes:
 
 
 def _chosen(scenario: Scenario, run: str | None) -> str:
-    """The run, which must have interventions."""
     having = [name for name, run in scenario.runs.items() if METHODS[run.method].intervenes]
     if run is None and having:
         return having[-1]

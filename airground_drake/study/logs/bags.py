@@ -111,7 +111,6 @@ def _opened(path: Path) -> BinaryIO:
 
 
 def _of_mcap(file: BinaryIO) -> Iterator[Message]:
-    """The messages of an MCAP file, in the order of the file."""
     # The readers of the package `mcap` unpack chunks without a limit; so chunks are unpacked here.
     from mcap.records import Channel as McapChannel
     from mcap.records import Chunk, Schema

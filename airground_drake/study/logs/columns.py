@@ -156,7 +156,6 @@ def split_unit(label: str) -> tuple[str, str]:
 
 
 def counts_frames(label: str) -> bool:
-    """Whether a column has the numbers of frames, by its name."""
     return re.sub(r"[\s_-]+", "_", label.split("/")[-1].strip().lower()) in COUNTERS
 
 

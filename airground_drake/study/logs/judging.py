@@ -351,7 +351,6 @@ def _lowest(shape: Shape, start: Array, end: Array) -> float:
 
 
 def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
-    """Stretches in which a distance is below a required one."""
     there, passes = shape.within(apart, need_m)
     below_s: list[Span] = []
     for k in np.flatnonzero(passes).tolist():

@@ -120,7 +120,6 @@ class Gathered:
         self.used: set[str] = set()
 
     def may_have(self, topic: str, kind: str) -> bool:
-        """Whether messages of a topic are worth decoding."""
         if topic in self.unused:
             return False
         has_places = not kind.replace("/msg/", "/").startswith(NO_PLACES) and FIXED not in segments(topic)

@@ -101,7 +101,6 @@ def _decoded(content: bytes) -> str:
 
 
 def _form(lines: Sequence[str]) -> tuple[str, int]:
-    """Delimiter, and number of fields."""
     for delimiter in (*DELIMITERS, " "):
         count, times = Counter(_count(line, delimiter) for line in lines).most_common(1)[0]
         if count >= FEWEST and times >= ALIKE * len(lines):
@@ -140,7 +139,6 @@ def _is_numeric(column: Sequence[str]) -> bool:
 
 
 def _decimal_comma(column: Sequence[str]) -> bool:
-    """Whether the numbers of a column have decimal commas."""
     with_comma = [cell for cell in column if _COMMA.fullmatch(cell)]
     if not with_comma or any(map(_POINT.fullmatch, column)):
         return False

@@ -175,7 +175,6 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
 
 
 def _not_there(name: str, log: Log, choice: Choice) -> str:
-    """What is said where a body is missing."""
     frames = sorted({stream.frame for stream in log.streams if stream.frame})
     if choice.frames and frames and not {*frames} & {*choice.frames}:
         return one_line(f"--frame {choice.frames[0]}: the log has no such frame; it has {', '.join(frames)[:300]}")
@@ -188,7 +187,6 @@ def _not_there(name: str, log: Log, choice: Choice) -> str:
 
 
 def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[str, Stream], list[str]]:
-    """The stream of each body, and what is said of the others."""
     _exist(choice.rename, log, bodies)
     candidates: dict[str, dict[int, list[Stream]]] = {}
     ignored = list[str]()
@@ -413,7 +411,6 @@ def _apart_at_the_start(tracks: Mapping[str, Track], scenario: Json) -> None:
 
 
 def _heights(tracks: Mapping[str, Track], scenario: Json, said: list[str]) -> None:
-    """Give UGVs and obstacles without a height that of the scenario."""
     flat = []
     for name, track in tracks.items():
         if np.isnan(track.places_m[:, 2]).any():

@@ -43,7 +43,6 @@ class _Motion(NamedTuple):
 
     @property
     def oddness(self) -> float:
-        """How far it is from the scenario."""
         speed = abs(math.log(self.speed)) if self.speed else 0.0
         return abs(math.log(max(self.lasting, 1e-12))) + speed + self.away
 
@@ -91,7 +90,6 @@ _WANTED = "wanted: --rate-hz with the frames per second, such as --rate-hz 25"
 
 
 def _of_frames(streams: Mapping[str, Stream], rate_hz: float) -> None:
-    """Turn numbers of frames into nanoseconds."""
     counted = [stream for stream in streams.values() if not stream.time_unit and not stream.nano.any()]
     if not counted:
         raise LogError("--rate-hz is for logs whose times are numbers of frames; this log has other times")

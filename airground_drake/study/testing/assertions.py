@@ -32,7 +32,6 @@ class ClaimError(AssertionError):
     """
 
     def __init__(self, message: str, verdicts: Sequence[Verdict] = ()) -> None:
-        """Keep the verdicts with the message."""
         super().__init__(message)
         self.verdicts = tuple(verdicts)
 

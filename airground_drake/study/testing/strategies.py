@@ -283,7 +283,6 @@ def _uavs(
 
 
 def _distinct(points: list[schema.Vector]) -> list[schema.Vector]:
-    """The points without immediate repetitions."""
     return [point for before, point in zip([None, *points], points, strict=False) if point != before]
 
 

@@ -116,7 +116,6 @@ def _separated(spaces: Sequence[Space], tasks: Sequence[RobotTask], ways: Sequen
 
 
 def _resting(task: RobotTask) -> OtherRobot:
-    """A robot that stays where it is."""
     return OtherRobot(at_rest(task.start), task.body)
 
 
@@ -245,7 +244,6 @@ class _Search:
         return _resting(mover.task)._replace(until=until)
 
     def _joint_steps(self, able: Sequence[int], candidates: int) -> list[Way | None] | None:
-        """A plan for some robots by joint steps."""
         movers = [self._movers[i] for i in able]
         if not all(mover.own.usable[-1] for mover in movers):
             return None  # a target is too near to an obstacle

@@ -78,7 +78,6 @@ def _next_constraint(digits: Indices, choices: Indices) -> bool:
 
 @njit(cache=True)
 def _by_priority(priorities: Array) -> Indices:
-    """The robots, the largest priority first."""
     return np.argsort(-priorities, kind="mergesort")
 
 

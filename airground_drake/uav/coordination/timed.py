@@ -105,7 +105,6 @@ def free_pieces(preset: Array, other: Array, apart: float) -> npt.NDArray[np.boo
 def straight_is_free(
     motion: Array, i: int, j: int, rows: Array, keep: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
 ) -> bool:
-    """Whether a timed motion may go straight from row i to row j."""
     # It keeps the allowed distances. Where one of the two rows is nearer, it comes no nearer than that row.
     # motion: (M, 3); rows: (m, W); keep: (m,), m; others: (R, 3); begins: (B + 1,); apart: (B,), m
     t, x, y = motion[i, 0], motion[i, 1], motion[i, 2]

@@ -142,7 +142,6 @@ _GUESTS: weakref.WeakSet[GuestPolicy] = weakref.WeakSet()
 
 
 def end_all() -> None:
-    """End the processes of all policies that this process has started."""
     for guest in list(_GUESTS):
         guest.close()
 
@@ -168,7 +167,6 @@ def _hung_up_after(seconds: float, channel: Connection) -> Iterator[threading.Ev
 
 
 def _kill(process: subprocess.Popen[bytes], channel: Connection, alive: Connection, owner: int) -> None:
-    """End a process and its group, and wait for it."""
     channel.close()
     alive.close()
     if os.getpid() != owner:  # this is a fork of the process that started it

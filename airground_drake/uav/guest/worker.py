@@ -36,7 +36,6 @@ def main(channel: int) -> None:
 
 
 def answer(policy: Policy, data: bytes) -> dict[str, Any]:
-    """The policy's answer to an encoded observation."""
     # Returns `motions`, a list of names and motions, or a `fault` and its `traceback`.
     try:
         seen = decoded(data, KINDS)

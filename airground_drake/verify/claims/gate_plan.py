@@ -360,7 +360,6 @@ class Enclosure:
     other_first: float
 
     def __and__(self, other: Enclosure) -> Enclosure:
-        """The better of each bound."""
         lower, upper = max(self.lower, other.lower), min(self.upper, other.upper)
         return Enclosure(lower, upper, max(self.other_first, other.other_first))
 

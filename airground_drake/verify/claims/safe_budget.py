@@ -72,7 +72,6 @@ class SafeBudget(TheoremClaim):
         return takes_room(scenario) or scenario.ugv_links is not None
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """Gain and period; the plants and their speed limits; the distances of each kind of pair."""
         control, robots = scenario.control, scenario.robots
         return {
             "avoidance_gain_1_s": control.avoidance_gain_1_s,
@@ -105,7 +104,6 @@ class SafeBudget(TheoremClaim):
         return TheoremClaim.check(claim, inputs)
 
     def hypotheses(self, inputs: dict[str, Any]) -> Sequence[Hypothesis]:
-        """A h at most 1; what theorems ask of the numbers of plants; distances in the law."""
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
         needs = [
             Hypothesis.of(need.symbol, f"{name}: {need.says}", need.margin, need.unit, strict=need.strict)

@@ -531,7 +531,6 @@ class OwnPlant:
 
 
 def own_plants(trace: Trace) -> list[OwnPlant]:
-    """All robots with users' plants."""
     plants = []
     for name, robot in trace.scenario.robots.items():
         if measured := trace.plant(name).measured:
@@ -542,7 +541,6 @@ def own_plants(trace: Trace) -> list[OwnPlant]:
 
 
 def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
-    """Hypotheses of the theorems about plants."""
     ends = period_ends(trace)
     whole = np.flatnonzero(np.diff(trace.t[ends]) > 0.5 * trace.scenario.control.period_s)
     for name, robot in trace.scenario.robots.items():

@@ -62,7 +62,6 @@ class SafeOwn(TraceClaim):
             return True  # `judge` says what is wrong
 
     def check(self, trace: Trace) -> Finding:
-        """The least of the margins of all robots in all pairs."""
         margins = sorted(_margins(trace), key=lambda own: own.margin_m)
         worst = margins[0] if margins else None
         own = worst is not None and not worst.margin_m >= -DISTANCE_TOLERANCE_M

@@ -99,7 +99,6 @@ def running(experiment: PassageExperiment) -> tuple[float, float]:
 
 @lru_cache(maxsize=16)
 def simulate(experiment: PassageExperiment) -> PassageSample:
-    """Decide all paths of an experiment."""
     rng = np.random.default_rng(experiment.seed)
     mean, deviation = experiment.drift * experiment.period, experiment.noise * math.sqrt(experiment.period)
     x = np.full(experiment.paths, experiment.deviation)

@@ -152,7 +152,6 @@ class TriggerLevels(NamedTuple):
 
 
 def levels_of(trace: Trace) -> TriggerLevels:
-    """The levels of a run by its scenario."""
     return levels_by(trace.scenario.decision, float(trace.meta["zeta_m"]))
 
 

@@ -69,7 +69,6 @@ class Refinement:
 
 
 def experiment(inputs: dict[str, Any]) -> Refinement:
-    """The experiment for the constants of a scenario."""
     trigger = trigger_of(inputs)
     fewest, most = COARSE_STEPS
     scale = trigger.dwell or 1.0
@@ -261,7 +260,6 @@ class ZenoRefine(ModelClaim):
 
 
 def series(setting: Refinement, triggers: dict[str, Array]) -> Series:
-    """The evidence, from the counts of an experiment."""
     dt, dwell = np.array(setting.dt_s), setting.trigger.dwell
     expected = np.array([expected_bare(setting, step) for step in setting.dt_s])
     rng = np.random.default_rng([SEED, PATHS])
@@ -292,7 +290,6 @@ def series(setting: Refinement, triggers: dict[str, Array]) -> Series:
 
 
 def _counted(values: Array) -> Counted:
-    """Summarise triggers by path and dt."""
     error = values.std(axis=0, ddof=1) / math.sqrt(PATHS)
     return Counted(values.mean(axis=0).tolist(), error.tolist(), values.max(axis=0).tolist())
 
@@ -304,7 +301,6 @@ def _fit(dt: Array, mean: Array) -> Array:
 
 
 def judge_experiment(setting: Refinement) -> Finding:
-    """The finding of an experiment by the rule of the module docstring."""
     triggers = counts(setting)
     evidence = series(setting, triggers)
     bare, ours = evidence.fit["bare"], evidence.fit["automaton"]

@@ -85,7 +85,6 @@ class Cores:
 
     @property
     def are_points(self) -> bool:
-        """Whether every core is a point."""
         return self.corners.shape[-2] == 1 and bool((self.base == self.top).all())
 
     @property

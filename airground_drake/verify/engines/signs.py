@@ -66,12 +66,10 @@ class ThresholdRule(NamedTuple):
 
 
 def ball(value: Fraction) -> Any:
-    """A ball that contains a rational number."""
     return flint.arb(flint.fmpq(*value.as_integer_ratio()))
 
 
 def value(function: Function, u: Fraction) -> Any:
-    """A ball that contains the function's value at u."""
     with _flint, flint.ctx.workprec(PRECISION_BITS):
         return function(ball(u))
 

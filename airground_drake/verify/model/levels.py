@@ -31,5 +31,4 @@ def threshold_m(scenario: Scenario) -> float:
 
 
 def trigger_of(inputs: dict[str, Any]) -> Trigger:
-    """The automaton with these levels."""
     return Trigger(inputs["zeta_m"], inputs["released_below_m"], inputs["dwell_s"])

@@ -67,7 +67,6 @@ class TheoremClaim(ModelClaim):
         """The hypotheses of the theorems, for these constants."""
 
     def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
-        """The proof, with the numbers that follow for these constants."""
         return Proof(**proof)
 
     def with_runs(self, finding: Finding, seen: Sequence[tuple[int, int]]) -> Finding:
@@ -82,7 +81,6 @@ class TheoremClaim(ModelClaim):
         return None
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Check the hypotheses, and whether Coq has checked the theorems as they stand here."""
         hypotheses = self.hypotheses(inputs)
         broken = [hypothesis for hypothesis in hypotheses if not hypothesis.holds]
         named = [hypothesis for hypothesis in hypotheses if hypothesis.hypothesis == self.margin_of]

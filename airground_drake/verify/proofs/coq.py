@@ -52,7 +52,6 @@ def screen(text: str, name: str) -> None:
 
 
 def without_comments(text: str) -> str:
-    """The text of a Coq file without its comments, which may be nested."""
     depth, kept = 0, []
     for part in re.split(r"(\(\*|\*\))", text):
         if part == "(*":

@@ -82,7 +82,6 @@ class Demand(NamedTuple):
 
     @property
     def lemma(self) -> str:
-        """Name of the lemma about it."""
         return f"{self.first}_and_{self.second}"
 
     @property
@@ -388,7 +387,6 @@ def _grouped(demands: Sequence[Demand], texts: Sequence[str]) -> list[list[str]]
 
 
 def _together(demands: Sequence[Demand], name: str, interval: str, claims: Sequence[str], prefix: str) -> str:
-    """The theorem of all claims, from the lemmas about them."""
     groups = " /\\\n  ".join("(" + " /\\\n   ".join(group) + ")" for group in _grouped(demands, claims))
     lemmas = _grouped(demands, [f"({prefix}{demand.lemma} t T)" for demand in demands])
     proof = all_of([all_of(group) for group in lemmas])
@@ -396,7 +394,6 @@ def _together(demands: Sequence[Demand], name: str, interval: str, claims: Seque
 
 
 def all_of(proofs: Sequence[str]) -> str:
-    """A proof of a conjunction from proofs of its parts."""
     return "".join(f"(conj {proof}\n  " for proof in proofs[:-1]) + proofs[-1] + ")" * (len(proofs) - 1)
 
 
@@ -437,7 +434,6 @@ def stride(rows: Sequence[Vector]) -> int:
 
 
 def real(number: Fraction) -> str:
-    """A real number in Coq."""
     return str(number.numerator) if number.denominator == 1 else f"({number.numerator} / {number.denominator})"
 
 

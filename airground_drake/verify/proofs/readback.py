@@ -139,7 +139,6 @@ def _value(text: str) -> Fraction:
 
 
 def _parts(pattern: str, text: str) -> tuple[str, ...]:
-    """The groups of the one place that a pattern matches."""
     matches = list(re.finditer(pattern, text, re.MULTILINE | re.DOTALL))
     if len(matches) != 1:
         raise ReadbackError(f"{pattern.split(' :')[0].lstrip('^')} is in the file {len(matches)} times; wanted: once")

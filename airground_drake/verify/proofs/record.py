@@ -92,7 +92,6 @@ def closure(names: Iterable[str], folder: Path = FOLDER) -> list[str]:
 
 
 def required(file: Path) -> list[str]:
-    """The theories in the same folder that a file requires."""
     words = re.findall(r"^Require Import ([^.]*)\.", file.read_text(encoding="utf-8"), re.MULTILINE)
     modules = [f"{word}.v" for line in words for word in line.split()]
     return [module for module in modules if (file.parent / module).exists()]

@@ -136,7 +136,6 @@ def _usable(run: Trace) -> Iterator[None]:
 
 
 def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, limit_s: float) -> CoqReply:
-    """Have Coq decide one exported file."""
     files.write_text(place.folder / name, text)
     started = time.perf_counter()
     try:
@@ -196,7 +195,6 @@ def expects_kept(run: Trace) -> bool:
 
 
 def document(place: Workshop, answers: Sequence[Proved]) -> dict[str, Any]:
-    """What was found, as strict JSON."""
     return {
         "schema": SCHEMA,
         "coq": place.coq,
@@ -308,6 +306,5 @@ def _broken(folder: Path, record: Mapping[str, Any], traces: Mapping[str, Trace]
 
 
 def _unless(about: str, wanted: Any, recorded: Any) -> Iterator[Broken]:
-    """A broken rule, unless both are equal."""
     if recorded != wanted:
         yield about, wanted, recorded

@@ -196,6 +196,5 @@ def _reduced(a: Vector) -> Vector:
 
 
 def root_up(square: int) -> int:
-    """The square root, rounded up."""
     root = isqrt(square)
     return root + (root * root < square)

@@ -50,7 +50,6 @@ def entries(run: Recorded) -> list[Entry]:
 
 
 def missed(run: Recorded, table: Sequence[Entry]) -> list[Missed]:
-    """The pairs with periods that no entry is about."""
     last = len(run.times) - 1
     pairs = []
     for demand in lawful(run.demands):
@@ -164,7 +163,6 @@ class TooNear:
     t_s: float  # when the pair is so near
 
     def __str__(self) -> str:
-        """The pair, its distance and the time."""
         pair = " and ".join(self.demand.called)
         wanted = f"{self.short_m:.3g} m less than {float(self.demand.required_m):g} m"
         return f"{pair} are {self.least_m:.6g} m apart at {self.t_s:.6g} s, {wanted}"

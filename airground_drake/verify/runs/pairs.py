@@ -72,7 +72,6 @@ class Pair(NamedTuple):
 
     @property
     def rows(self) -> slice:
-        """The rows in which both are there."""
         return slice(self.row, self.last + 1)
 
     @property
@@ -228,7 +227,6 @@ def lifetimes(trace: Trace) -> tuple[Indices, Indices]:
 
 
 def is_planar(trace: Trace, robot: str) -> bool:
-    """Whether a robot stays in its plane."""
     return robot in trace.ugvs
 
 

@@ -36,7 +36,6 @@ class ProposalRecord:
 
 
 def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
-    """The proposal of a row of the table."""
     times, places, selection, mapped = (
         np.asarray(row[name], dtype=np.float64).ravel() for name in ("times_s", "positions_m", "selection", "mapped")
     )
@@ -67,7 +66,6 @@ def _sent(trace: Trace, row: Mapping[Any, Any]) -> ProposalRecord:
 
 @per_trace
 def proposals_of(trace: Trace) -> list[ProposalRecord]:
-    """All proposals of a run, by time."""
     proposals = [_sent(trace, row) for row in trace.proposals.to_dict("records")]
     recorded = sorted((s.ugv, s.issued_s, s.policy) for s in proposals)
     events = sorted((e["robot"], float(e["t_s"]), e["policy"]) for e in trace.events if e["kind"] == "proposal")

@@ -27,7 +27,6 @@ LARGEST_SAMPLE = 9.0  # standard deviations: one normal sample in 1e19 is larger
 
 
 def recorded_events(trace: Trace, ugv: str) -> list[Transition]:
-    """Trigger and release events of a UGV by time."""
     own = (event for event in trace.events if event["robot"] == ugv and event["kind"] in ("trigger", "release"))
     return sorted((float(event["t_s"]), str(event["kind"])) for event in own)
 
