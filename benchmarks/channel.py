@@ -80,9 +80,11 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def _cell(rows: list[dict[str, Any]]) -> str:
-    """The latest arrival, s; in bold, how many UGVs did not arrive, of how many."""
+    """The latest arrival, s; in bold, how many UGVs did not arrive, of how many; -: no run."""
+    if not rows:
+        return "-"
     missing, every = sum(row["of"] - row["arrived"] for row in rows), sum(row["of"] for row in rows)
-    return f"**{missing} of {every}**" if missing else f"{max((row['last_s'] for row in rows), default=0.0):.1f}"
+    return f"**{missing} of {every}**" if missing else f"{max(row['last_s'] for row in rows):.1f}"
 
 
 def _counts(_: str, __: float, loss: float, ugvs_loss: float, seed: int) -> bool:
@@ -108,7 +110,8 @@ def main() -> None:
         for future in as_completed([pool.submit(run, *each) for each in wanted if each not in made and _counts(*each)]):
             rows.append(future.result())
             print(json.dumps(rows[-1]), file=file, flush=True)
-    print("\n".join(table(sorted(rows, key=lambda row: given.scenarios.index(row["scenario"])))))
+    order = [*dict.fromkeys([*SCENARIOS, *(row["scenario"] for row in rows)])]
+    print("\n".join(table(sorted(rows, key=lambda row: order.index(row["scenario"])))))
 
 
 if __name__ == "__main__":

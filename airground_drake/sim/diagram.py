@@ -165,9 +165,8 @@ def build_model(
     between = positions_between(scenario, world, law)
     ugvs = OwnUgvController(own, world, law, ugv_controller) if own else between.controller
     uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
-    # input ports of the parts for which `bodies` are positions as published, and as the UAV sees them
-    measured = {} if between.published == "bodies" else {"bodies": between.published}
-    seen = {"bodies": "seen_by_uav"} if scenario.sensing else {}
+    # input ports of the parts for which `bodies` are positions as published, and as UAVs see them
+    measured, seen = ({} if port == "bodies" else {"bodies": port} for port in (between.published, between.seen))
     parts = {
         "decision_making": decision,
         "task_planning": _task_planning(presets, planners, ugvs, uavs, measured, seen),

@@ -175,6 +175,7 @@ class Between(NamedTuple):
     parts: Mapping[str, LeafSystem]  # of the diagram, by name
     renamed: Mapping[System, Mapping[str, str]]  # what feeds their port `bodies`
     published: str  # name of the output port with the positions that robots act on
+    seen: str  # and of that with those with which UAVs plan
 
 
 def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
@@ -185,11 +186,12 @@ def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
         scenario.control.period_s,
     )
     parts, renamed = dict[str, LeafSystem](), dict[System, Mapping[str, str]]()
+    seen = "seen_by_uav" if scenario.sensing else "bodies"
     if link and link.delay_s:
         parts["announcements"] = Announcements(world, period, scenario.faults.late if scenario.faults else 0.0)
         renamed[parts["announcements"]], published = {"bodies": published}, "announced"
     if not (scenario.channel and link and link.loss):
-        return Between(UgvController(world, law), parts, renamed, published)
+        return Between(UgvController(world, law), parts, renamed, published, seen)
     parts["hearing"] = Hearing(world, scenario.channel.seed, link.loss, period)
     renamed[parts["hearing"]] = {"bodies": published}
-    return Between(WaryUgvController(world, law), parts, renamed, published)
+    return Between(WaryUgvController(world, law), parts, renamed, published, seen)
