@@ -123,5 +123,4 @@ def report(shared: Path) -> Callable[[str], Path]:
 
 @pytest.fixture
 def case_a() -> Scenario:
-    """A fresh copy of the shipped scenario, to be changed at will."""
     return load("case_a")

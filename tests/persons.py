@@ -19,7 +19,6 @@ def walking(*way: list[float], speed: float = 1.2, **more: Any) -> dict[str, Any
 def lone(
     name: str, start: float, target: float, *, speed: float = 0.6, duration: float = 12.0, **more: Any
 ) -> Scenario:
-    """One UGV along the x axis, and the UAV above it."""
     begin, end = [start, 0.0, 0.0], [target, 0.0, 0.0]
     ugv = {"start_m": begin, "target_m": end, "preset": {"waypoints_m": [begin, end], "speed_m_s": speed}}
     data = {
@@ -48,7 +47,6 @@ FORK = {
 
 @cache
 def scenario(name: str) -> Scenario:
-    """A scenario by name."""
     if name == "standing":
         return lone(name, -1.0, 0.0, obstacles={"person": walking([5.0, 0.0], [-5.0, 0.0])})
     if name == "squeezed":
@@ -81,5 +79,4 @@ def scenario(name: str) -> Scenario:
 
 @cache
 def run(name: str, of: str = "a") -> Trace:
-    """A run of one of these scenarios."""
     return ag.simulate(scenario(name), of)

@@ -6,11 +6,5 @@ from hypothesis import settings
 
 
 def examples(count: int, fuzz: int = 5000, **more: Any) -> settings:
-    """Settings of a property: `count` examples in the suite, `fuzz` of them with `--hypothesis-profile=fuzz`.
-
-    Args:
-        count: the same ones each time.
-        fuzz: new ones each time; fewer than 5,000 where one takes seconds.
-        more: other settings.
-    """
+    """Settings of a property: `count` examples in the suite, `fuzz` of them with `--hypothesis-profile=fuzz`."""
     return settings(max_examples=count if settings.default.derandomize else fuzz, **more)

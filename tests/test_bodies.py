@@ -14,17 +14,15 @@ from builders.misbuilt import neighbours
 from oracles import faults_of
 from report.cases import built
 
-from airground_drake.base.errors import TraceError
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.outline import GAP
-from airground_drake.report import attention, document
+from airground_drake.report import attention
 from airground_drake.report.export import recording
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.html import page
-from airground_drake.report.metrics import closest_obstacle, gap_m, of_run
+from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.model import of
 from airground_drake.report.screen import first_screen
-from airground_drake.report.view.stage import stage
 from airground_drake.scenario.load import load, validated
 from airground_drake.scenario.schema import Policy, Run, Scenario
 from airground_drake.sim.simulation import simulate
@@ -42,7 +40,6 @@ ROCK, OWN, FLIER = 0.5, 0.25, 0.25
 
 
 def scenario(*, points: bool = False) -> Scenario:
-    """The minimal scenario with bodies, or with points that keep as much more."""
     found = load("minimal", ["duration_s=11"])
     safe = found.safe_distance
     safe.obstacle_m, safe.air_ground_m, safe.ugv_m = 1.25, 0.75, 1.75
@@ -202,33 +199,13 @@ def test_where_it_appears_too_near_is_nobodys_doing() -> None:
     assert not faults_of(trace)
 
 
-@pytest.mark.parametrize("appears_s", [4.6, 5.1])  # ahead of it; under it
-def test_a_robot_that_lags_is_not_blamed_for_what_appears(appears_s: float) -> None:
-    """It comes nearer for as long as its lag makes it, and steers back from the first sample on."""
-    changes = (
-        "ugvs.ugv1.plant={kind: lag, time_constant_s: 0.3}", "ugvs.ugv1.max_speed_m_s=1.5", "ugvs.ugv1.radius_m=0.2",
-        "safe_distance.obstacle_m=0.5", "obstacles.rock.radius_m=0.3",
-        "obstacles.person={radius_m: 0.2, moves: {waypoints_m: [[0, 9], [4, 9]], speed_m_s: 0.5}}",
-    )  # fmt: skip
-    trace = simulate(sudden(appears_s, *changes), "d")
-    found = {verdict.claim.id: verdict for verdict in judge(trace, ("SAFE-TRACE", "SAFE-OWN"))}
-    seen = found["SAFE-TRACE"].counterexample or {}
-    assert seen["t_s"] > appears_s
-    told, drove = seen["why"].split("; ")
-    assert told == f"rock appeared at {appears_s} s too near to ugv1: nobody's doing"
-    assert drove.endswith("m on by commands under way")
-    assert found["SAFE-OWN"].status == "holds"
-
-
 def test_it_collides_with_nobody_before_it_appears() -> None:
-    """ugv1 drives over the place at 5 s."""
     passed, hit = (simulate(sudden(t, "runs={d: {method: d}}"), "d") for t in (8.0, 5.0))
     assert [event["kind"] for event in passed.events if event["kind"] == "collision"] == []
     assert [event["t_s"] for event in hit.events if event["kind"] == "collision"] == pytest.approx([5.0])
 
 
 def test_the_uav_knows_it_from_then_on() -> None:
-    """Its map has the rock in a proposal after it appeared, and not before."""
     for appears_s, known in ((2.0, 1), (8.0, 0)):
         changes = (
             "obstacles.wall={position_m: [2.5, 0.5, 0.0]}", "obstacles.gate={position_m: [2.5, -0.5, 0.0]}",
@@ -247,21 +224,3 @@ def test_a_controller_that_knows_of_it_too_early_or_late_is_found(monkeypatch: p
             patched.setattr(World, "at", lambda self, near, t, at=at, shift=shift: at(self, near, t - shift))
             trace = simulate(sudden(1.0 if shift > 0.0 else 2.0, ahead), "a")
         assert noticed in faults_of(trace) or statuses(trace)[noticed] == "refuted"
-
-
-def test_coq_is_not_asked_about_it() -> None:
-    with pytest.raises(TraceError, match=r"rock has appears_s; no theorem is about such a body"):
-        recorded(simulate(sudden(2.0), "d"))
-
-
-def test_the_page_says_that_it_appeared_there() -> None:
-    """On its first screen, and as a gap in the distances; replays show it from then on."""
-    trace = simulate(sudden(4.2), "d")
-    metrics = of_run(trace)["min_distance_m"]["ugv1"]["rock"]
-    assert metrics["appeared"] is True
-    built = document.build(trace.scenario, {"d": trace}, judge(trace), {"package": "", "seed": 1, "started": ""})
-    (row,) = (row for row in first_screen(of(built)).rows if row.run == "d")
-    assert row.safe.lines[1] == "ugv1\N{EN DASH}rock 0.800 < 2 m at 4.20 s"
-    gap = gap_m(trace, "ugv1", "rock")
-    np.testing.assert_array_equal(np.isnan(gap), np.arange(len(gap)) < trace.there_from("rock"))
-    assert stage(trace.scenario).barriers[0].appears_s == 4.2

@@ -35,7 +35,6 @@ def test_gatekeepers_know_of_interventions_only_what_is_sent() -> None:
 
 @cache
 def tree(path: Path) -> ast.Module:
-    """What a file says."""
     return ast.parse(path.read_text(encoding="utf-8"))
 
 

@@ -13,7 +13,6 @@ DEVIATIONS = runpy.run_path(str(Path(__file__).parent.parent / "docs" / "equatio
 
 
 def way_to(place: str) -> list[Any]:
-    """Module, class and method of `module:Class.method`."""
     module, _, name = place.partition(":")
     way = [import_module(f"airground_drake.{module}")]
     for part in name.split("."):
@@ -22,7 +21,6 @@ def way_to(place: str) -> list[Any]:
 
 
 def numbers(text: str) -> set[int]:
-    """Equation numbers in a text, ranges expanded."""
     pairs = re.findall(r"\((\d{1,2})[a-e]?\)(?:-\((\d{1,2})[a-e]?\))?", text)
     return {k for first, last in pairs for k in range(int(first), int(last or first) + 1)}
 

@@ -4,10 +4,8 @@ from airground_drake.sim.trace import Trace
 
 
 def kinds(of_run: Trace, robot: str) -> list[str]:
-    """Kinds of a robot's events."""
     return [event["kind"] for event in of_run.events if event["robot"] == robot]
 
 
 def times(of_run: Trace, kind: str) -> list[float]:
-    """Times of the events of a kind, s."""
     return [event["t_s"] for event in of_run.events if event["kind"] == kind]

@@ -18,8 +18,6 @@ WEIGHTS = ("dt", "error_weight", "slack_weight", "terminal_weight")
 
 @dataclass
 class GateData:
-    """The data of a problem, in units and shapes of `gate_record.DecisionRecord`; costs of plans and of positions."""
-
     initial_m: Array
     accept_m_s: Array
     refuse_m_s: Array
@@ -38,14 +36,12 @@ class GateData:
         return cls(*(row[name] for name in ARRAYS[:-1]), row.half_planes, *(getattr(row, name) for name in WEIGHTS))
 
     def row(self, plan: Array) -> DecisionRecord:
-        """A record of a decision for a plan, with this problem."""
         arrays: dict[str, Array | None] = {name: getattr(self, name) for name in ARRAYS}
         return DecisionRecord(
             {"robot": "ugv1", "t_s": 0.0}, *(getattr(self, name) for name in WEIGHTS), arrays | {"plan": plan}
         )
 
     def positions(self, omega: Array) -> Array:
-        """Ends of the stages under a plan, (N, 3), m."""
         at, path = self.initial_m.copy(), []
         for k in range(STAGES):
             at = at + self.dt * (omega[k] * self.accept_m_s[k] + (1.0 - omega[k]) * self.refuse_m_s[k])
@@ -53,7 +49,6 @@ class GateData:
         return np.array(path)
 
     def plan_cost(self, omega: Array, along: bool = False) -> float:
-        """Cost of a plan, by exact distances or along the normals."""
         positions = self.positions(omega)
         total = self.terminal_weight * self.error_weight * np.sum((self.reference_m[-1] - positions[-1]) ** 2)
         for k, at in enumerate(positions):

@@ -15,15 +15,12 @@ def work(folder: Path, always: int, item: int) -> int:
 
 
 def times(factor: int, item: int) -> int:
-    """A product."""
     return factor * item
 
 
 def process(item: int) -> int:
-    """The process that does the item."""
     return os.getpid()
 
 
 def asleep(item: int) -> None:
-    """So many seconds."""
     time.sleep(item)

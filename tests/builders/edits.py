@@ -15,21 +15,18 @@ from builders.scenarios import changed
 
 
 def with_states(trace: Trace, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
-    """A copy whose states were edited, in place or by returning new ones."""
     states = trace.states.copy()
     edited = edit(states)
     return replace(trace, states=states if edited is None else edited)
 
 
 def with_samples(trace: Trace, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
-    """A copy whose samples were edited, in place or by returning new ones."""
     samples = trace.samples.copy()
     edited = edit(samples)
     return replace(trace, samples=samples if edited is None else edited)
 
 
 def with_meta(trace: Trace, **changes: Any) -> Trace:
-    """A copy with entries of `meta` replaced."""
     return replace(trace, meta=copy.deepcopy(trace.meta) | changes)
 
 
@@ -91,8 +88,6 @@ def _with_column(trace: Trace, column: str, edit: Callable[[pd.DataFrame], pd.Da
 
 
 def rows(keep: Callable[[pd.DataFrame], pd.DataFrame]) -> Callable[[Trace], Trace]:
-    """An edit that keeps some rows of the states, and the control samples at these."""
-
     def edit(trace: Trace) -> Trace:
         states = keep(trace.states).reset_index(drop=True)
         samples = trace.samples[trace.samples["t_s"].isin(states["t_s"][:-1])].reset_index(drop=True)

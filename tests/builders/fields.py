@@ -30,7 +30,6 @@ STATE = '<model name="{name}"><pose>{x} {y} 0.5 0 0 0</pose></model>'
 
 
 def world(seed: int, fill: float = 0.25) -> str:
-    """The text of a world: three walls, and a cylinder in each filled cell of an automaton."""
     filled = np.random.default_rng(seed).random(SHAPE) < fill
     for _ in range(ROUNDS):
         neighbours = ndimage.convolve(filled.astype(int), np.ones((3, 3), int), mode="constant") - filled

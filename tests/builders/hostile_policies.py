@@ -75,7 +75,6 @@ def in_a_thread(does: Callable[[], object]) -> None:
 
 
 def out_of_its_session() -> None:
-    """Keep the channel open outside the group that is killed, for a while."""
     os.setsid()
     time.sleep(3.0)
     os._exit(0)
@@ -87,7 +86,6 @@ def hoard(kept: list[Any]) -> None:
 
 
 def words(says: Callable[[], Any]) -> Callable[[Observation], NoReturn]:
-    """Raise an exception whose text is what a function returns."""
     return lambda seen: throw(type("WordyError", (Exception,), {"__str__": lambda self: says()})())
 
 
@@ -123,7 +121,6 @@ def change_by_force(seen: Observation) -> None:
 
 
 def channels() -> list[int]:
-    """Every open socket of this process."""
     opened = [int(each.name) for each in Path("/proc/self/fd").iterdir() if each.exists()]
     return [each for each in opened if stat.S_ISSOCK(os.fstat(each).st_mode)]
 
@@ -134,7 +131,6 @@ def say(data: bytes) -> None:
 
 
 def send(message: bytes) -> Callable[[Observation], None]:
-    """Write a message to the channel, as `Connection.send_bytes` does."""
     return lambda seen: say(struct.pack("!i", len(message)) + message)
 
 
@@ -151,12 +147,10 @@ def shut(seen: Observation) -> None:
 
 
 def answer(message: object) -> Callable[[Observation], None]:
-    """Answer in the worker's place, from the next question on."""
     return lambda seen: setattr(worker, "answer", lambda policy, data: message)
 
 
 def moves(times: str, positions: str) -> dict[str, Any]:
-    """A message with a motion, its arrays in base64."""
     arrays = {"times": (times, [-1]), "positions": (positions, [-1, 3])}
     packed = {name: {"@": "array", "base64": text, "shape": shape} for name, (text, shape) in arrays.items()}
     return {"motions": [["a", {"@": "Motion", **packed}]]}
@@ -168,7 +162,6 @@ def print_a_gigabyte(seen: Observation) -> None:
 
 
 def patch(module: str, kind: str, method: str) -> Callable[[Observation], None]:
-    """Have a method of the package do nothing."""
     return lambda seen: setattr(getattr(import_module(f"airground_drake.{module}"), kind), method, lambda *_: None)
 
 
@@ -263,8 +256,6 @@ KINDS: dict[str, Kind] = {
 
 
 class CountedRaises(Policy):
-    """Cannot say whether its work is counted."""
-
     @property
     def counted(self) -> bool:  # type: ignore[override]
         raise RuntimeError("not counted")

@@ -31,19 +31,7 @@ def laid_out(
     decisions: Sequence[dict[str, Any]] = (),
     timings: dict[str, Any] | None = None,
 ) -> Trace:
-    """A trace.
-
-    Args:
-        scenario: as resolved.
-        run: name of the run.
-        t: times of the rows, (T,), s.
-        position: of all robots, UAV last, (T, n + 1, 3), m.
-        velocity: held up to a row, (T, n + 1, 3), m/s.
-        held: of the UGVs, by column, (T, n), and `executing`; 0, or -1 for a time, where a column is left out.
-        events: in any order.
-        decisions: what is known of each.
-        timings: as measured.
-    """
+    """Positions and velocities (T, n + 1, 3), UAV last; `held`, of the UGVs, by column, (T, n), else 0 or -1."""
     ugvs = list(scenario["ugvs"])
     robots = [*ugvs, scenario["uav"]["name"]]
     at = sample_rows(t, scenario["control"]["period_s"]) if len(t) > 1 else np.zeros(0, dtype=np.intp)
@@ -70,7 +58,6 @@ def laid_out(
 
 
 def rebuilt(trace: Trace) -> Trace:
-    """A copy whose controllers were built with what its scenario demands."""
     built = {name: as_read_back(parameters) for name, parameters in demanded(trace).items()}
     return replace(trace, meta=trace.meta | {"controllers": built})
 
@@ -83,7 +70,6 @@ def as_read_back(parameters: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with_circles(numbers: list[float]) -> list[float]:
-    """Outlines, one after the other, with circles round their corners."""
     found, begin = list[float](), 0
     while begin < len(numbers):
         head = numbers[begin : begin + MIDDLE]
@@ -117,7 +103,6 @@ def _proposed(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def reference_at(preset: dict[str, Any], t: float) -> list[float]:
-    """Where a preset is, at its speed along its waypoints."""
     left = preset["speed_m_s"] * t
     for a, b in pairwise(preset["waypoints_m"]):
         length = math.dist(a, b)

@@ -31,7 +31,6 @@ Motion = dict[str, tuple[Array, Array]]
 
 
 def scenario(**more: Any) -> dict[str, Any]:
-    """The scenario as a document."""
     ugvs = {
         name: {
             "start_m": [*start, 0.0], "target_m": [1.6, start[1], 0.0], "max_speed_m_s": 1.0, "radius_m": RADII[name],
@@ -52,7 +51,6 @@ def scenario(**more: Any) -> dict[str, Any]:
 
 
 def write_scenario(folder: Path, **more: Any) -> Path:
-    """The scenario as a file."""
     path = folder / "lab.yaml"
     path.write_text(yaml.safe_dump(scenario(**more)))
     return path
@@ -77,7 +75,6 @@ def motion(bodies: Iterable[str] = ("tb_0", "tb_1", "uav"), every: int = 1) -> M
 
 
 def own_times(rates_hz: Mapping[str, float], jitter: float, seed: int) -> Motion:
-    """Samples of the polyline of `motion` at times of each body's own."""
     draw, whole, found = np.random.default_rng(seed), motion(), {}
     for name, rate in rates_hz.items():
         steps = (1.0 + jitter * draw.uniform(-1.0, 1.0, round(2 * LASTS_S * rate))) / rate
@@ -88,7 +85,6 @@ def own_times(rates_hz: Mapping[str, float], jitter: float, seed: int) -> Motion
 
 
 def at(track: tuple[Array, Array], t_s: Array) -> Array:
-    """Places of a polyline at times (m,): (m, 3)."""
     return np.stack([np.interp(t_s, track[0], axis) for axis in track[1].T], axis=1)
 
 
@@ -113,18 +109,15 @@ def least_gaps(bodies: Motion, gap_s: float = np.inf) -> dict[tuple[str, str], t
 
 
 def _gap(t_s: Array, begin: float, end: float) -> float:
-    """Time between the two samples around an interval."""
     k = int(np.searchsorted(t_s, 0.5 * (begin + end)))
     return float(t_s[k] - t_s[k - 1])
 
 
 def required_m(one: str, two: str) -> float:
-    """Distance that a pair must keep, m."""
     return GAPS["obstacle_m" if two == "pillar" else "air_ground_m" if "uav" in (one, two) else "ugv_m"]
 
 
 def read(path: Path | list[Path], document: Mapping[str, Any], **choice: Any) -> Tracks:
-    """The tracks of a log; `columns` maps columns, other words are those of `Choice`."""
     columns = choice.pop("columns", {})
     chosen, paths = Choice(**choice), path if isinstance(path, list) else [path]
     bodies = tracks.bodies_of(dict(document), chosen.uavs)
@@ -132,7 +125,6 @@ def read(path: Path | list[Path], document: Mapping[str, Any], **choice: Any) ->
 
 
 def judged(table: pd.DataFrame, document: Mapping[str, Any], folder: Path) -> Judged:
-    """A long table, judged by a resolved scenario."""
     table.to_csv(folder / "table.csv", index=False)
     return judge(read(folder / "table.csv", document), dict(document))
 
@@ -141,7 +133,6 @@ def judged(table: pd.DataFrame, document: Mapping[str, Any], folder: Path) -> Ju
 
 
 def rows(bodies: Motion) -> list[tuple[float, str, Array]]:
-    """Rows in the order of time."""
     found = [
         (float(t), name, place) for name, (t_s, places) in bodies.items() for t, place in zip(t_s, places, strict=True)
     ]
@@ -149,14 +140,12 @@ def rows(bodies: Motion) -> list[tuple[float, str, Array]]:
 
 
 def text(lines: Iterable[Iterable[Any]], delimiter: str = ",") -> str:
-    """A CSV file."""
     out = io.StringIO()
     csv.writer(out, delimiter=delimiter, lineterminator="\n").writerows(lines)
     return out.getvalue()
 
 
 def fixed(place: Array, scale: float = 1.0) -> list[str]:
-    """Coordinates with four decimals."""
     return [f"{scale * c + 0.0:.4f}" for c in place]
 
 
@@ -164,12 +153,10 @@ def long(
     bodies: Motion, head: str = "t_s,body,x_m,y_m,z_m", stamp: Callable[[float], str] = "{:.6f}".format,
     scale: float = 1.0,
 ) -> list[list[str]]:  # fmt: skip
-    """A long table: header and rows."""
     return [head.split(","), *([stamp(t), name, *fixed(place, scale)] for t, name, place in rows(bodies))]
 
 
 def wide(bodies: Motion, name: str = "{}_{}", scale: float = 1.0) -> list[list[str]]:
-    """A wide table of bodies that are sampled at the same times."""
     t_s = next(iter(bodies.values()))[0]
     head = ["time", *(name.format(body, axis) for body in bodies for axis in "xyz")]
     cells = [[c for _, places in bodies.values() for c in fixed(places[k], scale)] for k in range(len(t_s))]
@@ -177,7 +164,6 @@ def wide(bodies: Motion, name: str = "{}_{}", scale: float = 1.0) -> list[list[s
 
 
 def since_1970(t_s: float) -> str:
-    """A stamp in seconds."""
     ns = EPOCH_NS + round(t_s * 1e9)
     return f"{ns // 10**9}.{ns % 10**9:09d}"
 
@@ -189,7 +175,6 @@ Said = tuple[int, str, str, Any]
 
 
 def foxglove(bodies: Motion, late_s: Mapping[str, float]) -> list[Said]:
-    """Transforms of the UGVs and a pose of the UAV, and something else."""
     found: list[Said] = [(EPOCH_NS, "/log", "foxglove.Log", {"message": "on", "level": 2})]
     for t, name, place in rows(bodies):
         ns = EPOCH_NS + round(t * 1e9)
@@ -205,7 +190,6 @@ def foxglove(bodies: Motion, late_s: Mapping[str, float]) -> list[Said]:
 
 
 def mcap_json(path: Path, said: Iterable[Said], profile: str = "", chunk_size: int = 1_000_000) -> None:
-    """An MCAP file of messages in JSON."""
     from mcap.writer import Writer
 
     with path.open("wb") as file:
@@ -221,7 +205,6 @@ def mcap_json(path: Path, said: Iterable[Said], profile: str = "", chunk_size: i
 
 
 def mcap_protobuf(path: Path, bodies: Motion) -> None:
-    """An MCAP file of poses in protobuf, with types made here."""
     from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
     from mcap_protobuf.writer import Writer
 
@@ -256,8 +239,6 @@ def mcap_protobuf(path: Path, bodies: Motion) -> None:
 
 
 class Ros:
-    """Makes messages of ROS 1 or ROS 2."""
-
     def __init__(self, version: int) -> None:
         from rosbags.typesys import Stores, get_typestore
 
@@ -307,7 +288,6 @@ class Ros:
 
 
 def of_ros(ros: Ros, bodies: Motion, late_s: Mapping[str, float], frame: str = "map") -> list[Said]:
-    """Odometry of tb_0, a pose of tb_1, a transform of the UAV, and velocity commands."""
     found: list[Said] = [(EPOCH_NS + 1, "/tb_0/cmd_vel", *ros.twist())]
     for t, name, place in rows(bodies):
         ns = EPOCH_NS + round(t * 1e9)
@@ -322,7 +302,6 @@ def of_ros(ros: Ros, bodies: Motion, late_s: Mapping[str, float], frame: str = "
 
 
 def write_ros1(path: Path, ros: Ros, said: Iterable[Said]) -> None:
-    """A ROS 1 bag."""
     from rosbags.rosbag1 import Writer
 
     with Writer(path) as bag:

@@ -23,8 +23,6 @@ def neighbours(change: Callable[[Neighbours], Neighbours]) -> Patch:
 
 
 def distances(factor: float, *kinds: Kind) -> Patch:
-    """Between bodies of these kinds."""
-
     def apply(patch: pytest.MonkeyPatch) -> None:
         right = World.apart
 
@@ -63,8 +61,6 @@ def on_top(patch: pytest.MonkeyPatch) -> None:
 
 
 def unlayered(patch: pytest.MonkeyPatch) -> None:
-    """The UAV without its layer."""
-
     class Blind(controllers.UavController):
         def __init__(self, world: World, avoidance: Avoidance, **given: Any) -> None:
             super().__init__(world, replace(avoidance, sensing_range=0.0), **given)
@@ -76,8 +72,6 @@ speeding = neighbours(lambda given: given._replace(max_speed=1.5 * given.max_spe
 
 
 def half_rate(patch: pytest.MonkeyPatch) -> None:
-    """The UGVs sampled at half the rate."""
-
     class Slow(controllers.UgvController):
         def __init__(self, world: World, law: UgvLaw) -> None:
             period = law.avoidance.period

@@ -5,13 +5,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.geometry.outline import balls
 from airground_drake.uav.policy import Observation, Teammate
-
-Array = npt.NDArray[np.float64]
 
 
 def mate(name: str, position: Sequence[float], target: Sequence[float], **more: Any) -> Teammate:

@@ -24,19 +24,7 @@ def along(
     decisions: Sequence[dict[str, Any]] = (),
     timings: dict[str, Any] | None = None,
 ) -> Trace:
-    """Robots along corners, with their true decision variables.
-
-    Args:
-        scenario: as resolved.
-        run: name of the run.
-        corners: of each robot, UAV last; the first robot's decide when the run ends.
-        events: see `laid_out`, as for `decisions` and `timings`.
-        step_s: between rows.
-        x: decision variable of the first UGV by time instead.
-        intervention_s: between these times every UGV intervenes, and accepts.
-        decisions: as recorded.
-        timings: as measured.
-    """
+    """Robots along corners, UAV last, with true decision variables; `x`: that of the first UGV by time instead."""
     end = corners[0][-1][0]
     t = np.linspace(0.0, end, round(end / step_s) + 1)
     position = np.zeros((len(t), len(corners), 3))

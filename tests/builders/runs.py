@@ -13,7 +13,6 @@ from builders.simulation import simulate
 
 @cache
 def run_of(method: str) -> Trace:
-    """One run of the synthetic case A by each method."""
     return simulate(case_a(), method)
 
 
@@ -25,7 +24,6 @@ def chattering() -> Trace:
 
 
 def at_rest(t: float) -> list[list[float]]:
-    """No robot moves."""
     return [[0.0] * 3, [0.0] * 3]
 
 

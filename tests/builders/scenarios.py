@@ -34,7 +34,6 @@ def case_a(changes: dict[str, Any] | None = None) -> dict[str, Any]:
 
 
 def lone(start: list[float], target: list[float], preset: Preset, duration_s: float, **more: Any) -> dict[str, Any]:
-    """One scripted UGV far from everything else."""
     scenario = Scenario(
         name="lone", duration_s=duration_s, ugvs={"ugv1": Ugv(start, target, preset)}, uav=AWAY, runs={"d": Run("d")},
         **more,
@@ -43,7 +42,6 @@ def lone(start: list[float], target: list[float], preset: Preset, duration_s: fl
 
 
 def changed(tree: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """A copy of nested dicts with some dotted keys set."""
     tree = copy.deepcopy(tree)
     for key, value in changes.items():
         *path, last = key.split(".")

@@ -69,7 +69,6 @@ def rectangle(x: float, y: float, length: float, width: float, heading: float = 
 
 
 def wall(a: tuple[float, float], b: tuple[float, float]) -> Array:
-    """The outline of a wall between two places, m."""
     return outline.prism([a, b])
 
 

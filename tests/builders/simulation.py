@@ -126,7 +126,6 @@ class _Simulation:
         self.issued[~intervening] = -1.0
 
     def velocities(self, t: float) -> Array:
-        """NSBC with the avoidance inequalities on top; an accepted detour replaces the tracking task."""
         control = self.scenario["control"]
         lower = np.zeros((self.n + 1, 3))
         for i in range(self.n):

@@ -17,18 +17,15 @@ APART = 2.0
 
 
 def space(obstacles: Sequence[Sequence[float]] | Array = ()) -> Space:
-    """Discs of 2 m, robots 2 m apart, with 0.1 m and 0.2 m to spare."""
     rows = balls([[*centre, 0.0] for centre in obstacles])
     return Space(rows, np.full(len(rows), APART), 0.1, APART, 0.2)
 
 
 def task(start: Sequence[float] | Array, target: Sequence[float] | Array) -> RobotTask:
-    """From a place to a target, where the preset has arrived already."""
     return RobotTask(np.asarray(start, dtype=np.float64), np.array([[0.0, *target]]))
 
 
 def random_team(seed: int, count: int, obstacles: int, extent: float) -> tuple[Space, list[RobotTask]]:
-    """Robots and discs at random in a square."""
     rng = np.random.default_rng([seed, count])
 
     def apart(number: int, others: Sequence[Array], least: float) -> list[Array]:
@@ -45,5 +42,4 @@ def random_team(seed: int, count: int, obstacles: int, extent: float) -> tuple[S
 
 
 def motions(plan: Plan, tasks: Sequence[RobotTask]) -> list[Array]:
-    """What every robot does, those that stay included."""
     return [at_rest(e.start) if way is None else way.motion for way, e in zip(plan.ways, tasks, strict=True)]

@@ -53,11 +53,7 @@ def world(
 
 
 def beside_a_wall(seed: int, plant: Plant, near: bool) -> tuple[Array, Array, float, float]:
-    """What the law commands a robot to do, whatever its task asks for, on one side of a wall along y, or close to it.
-
-    Returns:
-        Command (3,), m/s; the speed that the task asks for, (3,), m/s; heading, rad; way to the wall that is left, m.
-    """
+    """Command, wish, heading, and room left, m, of a robot beside a wall along y, whatever its task asks for."""
     rng, rows = np.random.default_rng(seed), outline.stacked([outline.prism([[0.0, -9.0], [0.0, 9.0]], gap=0.5)])
     robot = Body("robot", "ugv", np.zeros(3), plant=plant, max_speed_m_s=1.0)
     around = World((robot, Body("wall", "obstacle", np.zeros(3), rows)), {}, 3.0).around(slice(0, 1))
@@ -70,11 +66,7 @@ def beside_a_wall(seed: int, plant: Plant, near: bool) -> tuple[Array, Array, fl
 
 
 def among_points(robots: Array, points: Array, safe: Array, share: Array, mobility: Array) -> tuple[Array, Neighbours]:
-    """Robots at places (k, 3), m, each beside points of its own, (k, K, 3), m; `safe`, m, and `share` are (k, K).
-
-    Returns:
-        Positions of all bodies, (k + k K, 3), m, and what each robot keeps away from.
-    """
+    """Robots at places (k, 3), m, each beside points of its own, (k, K, 3), m; `safe`, m, and `share` are (k, K)."""
     count, each = safe.shape
     positions = np.concatenate([robots, points.reshape(-1, 3)])
     bodies, others = np.arange(len(positions)), count + np.arange(count * each).reshape(count, each)

@@ -71,7 +71,6 @@ SETTINGS = (f"intervention.policies={json.dumps(POLICIES)}", "claims={MINE: 'che
 
 
 def make(folder: Path) -> None:
-    """Make the report that is forged: case B with a third-party policy and claim, and with two seeds."""
     settings = [word for each in SETTINGS for word in ("--set", each)]
     assert write_report(["case_b", "-o", str(folder), "-q", "--seeds", "2", *settings, OPTION]) == 0
 
@@ -132,7 +131,6 @@ def fault_left_out(folder: Path) -> None:
 
 
 def refusal_forgotten(folder: Path) -> None:
-    """The decisions on the first proposal are left out, with their problems and times."""
     issued = read_table(folder, "decisions", "c")["issued_s"]
     which = np.flatnonzero(issued != issued.iloc[0])
     for table in ("decisions", "problems"):
@@ -142,14 +140,12 @@ def refusal_forgotten(folder: Path) -> None:
 
 
 def bound_lowered(folder: Path) -> None:
-    """A bound that is far from the best one, with the gap that follows from it."""
     with edited_table(folder, "decisions", "c") as frame:
         frame["route_bound"] *= 0.98
         frame["gap"] = 1.0 - frame["route_bound"] / frame["objective"]
 
 
 def other_motion(folder: Path) -> None:
-    """Another motion in the proposal that was refused."""
     with edited_table(folder, "proposals") as frame:
         positions = [value.copy() for value in frame["positions_m"]]
         positions[0][-2] += 0.5
@@ -157,7 +153,6 @@ def other_motion(folder: Path) -> None:
 
 
 def drawing_moved(folder: Path) -> None:
-    """A path in a figure of the page begins 0.1 units further right."""
     text = (folder / "report.html").read_text(encoding="utf-8")
     begins = re.search(r' d="M (\d+\.\d+)', text)
     assert begins is not None
@@ -178,7 +173,6 @@ def painted_over(folder: Path) -> None:
 
 
 def crash_called_proved(folder: Path) -> None:
-    """What `airground prove` would write of run b, as if Coq had accepted it."""
     from airground_drake.verify.proofs.export import distances_file, recorded
     from airground_drake.verify.proofs.readback import compare
     from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, FOLDER, closure, digest
@@ -214,7 +208,6 @@ def columns_of_reality(folder: Path) -> None:
 
 
 def seeds_row(**values: Any) -> Edit:
-    """The last row of the table of seeds, which is of another seed than the report's own."""
     return report("seeds", -1, value=lambda old: old | values)
 
 
@@ -304,7 +297,6 @@ def simulating_once(patch: pytest.MonkeyPatch) -> None:
 
 
 def main(folder: Path) -> None:
-    """Print the table."""
     if not folder.exists():
         make(folder)
     print("| forgery | (i) | (ii) | (iii) |\n| --- | --- | --- | --- |")

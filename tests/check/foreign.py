@@ -9,15 +9,11 @@ from airground_drake.verify.finding import Finding
 
 
 class Fails(Policy):
-    """Raises whenever it is asked."""
-
     def propose(self, seen: Observation) -> NoReturn:
         raise KeyError("no plan")
 
 
 class Short(TraceClaim):
-    """The run lasts less than a minute."""
-
     id = "MINE"
     summary = statement = "The run is short."
     formula = "T < 60"

@@ -36,7 +36,6 @@ ROW, BETWEEN, LATE = 300, 215, 450
 
 
 def put(part: Any, path: tuple[Any, ...], value: Any) -> None:
-    """Put a value into nested ones; a function is given what is there."""
     *above, last = path
     for key in above:
         part = part[key]
@@ -69,8 +68,6 @@ def meta(*path: Any, value: Any, file: str = "meta.json") -> Edit:
 
 
 def both(*path: Any, value: Any, run: str = RUN) -> Edit:
-    """In the run's entry in report.json and in its meta.json."""
-
     def edit(folder: Path) -> None:
         with edited_entries(folder, run) as entries:
             for entry in entries:
@@ -80,8 +77,6 @@ def both(*path: Any, value: Any, run: str = RUN) -> Edit:
 
 
 def everywhere(*path: Any, value: Any) -> Edit:
-    """In the scenario, wherever it is."""
-
     def edit(folder: Path) -> None:
         with edited_scenarios(folder) as scenarios:
             for scenario in scenarios:
@@ -91,8 +86,6 @@ def everywhere(*path: Any, value: Any) -> Edit:
 
 
 def cells(column: str, value: Any, rows: Any = ROW, table: str = "states", run: str = RUN) -> Edit:
-    """Cells of a column; a function is given what is there."""
-
     def edit(folder: Path) -> None:
         with edited_table(folder, table, run) as frame:
             name = column if column in frame else f"{UGV}.{column}"
@@ -103,7 +96,6 @@ def cells(column: str, value: Any, rows: Any = ROW, table: str = "states", run: 
 
 
 def rows(keep: Callable[[pd.DataFrame], Any], table: str = "states", run: str = RUN) -> Edit:
-    """Other rows of a table."""
     return lambda folder: write_table(folder, keep(read_table(folder, table, run)), table, run)
 
 
@@ -112,8 +104,6 @@ def file(name: str, content: bytes) -> Edit:
 
 
 def words(name: str, old: str, new: str) -> Edit:
-    """Other words in a file."""
-
     def edit(folder: Path) -> None:
         text = (folder / name).read_text(encoding="utf-8")
         assert old in text
@@ -131,8 +121,6 @@ def all_of(*edits: Edit) -> Edit:
 
 
 def leap(robot: str, by_m: float, row: int = ROW, axis: str = "x") -> Edit:
-    """Put a robot elsewhere at one row, with commands that lead there and back."""
-
     def edit(folder: Path) -> None:
         with edited_table(folder) as frame:
             t = frame["t_s"].to_numpy()
@@ -154,13 +142,10 @@ def leap(robot: str, by_m: float, row: int = ROW, axis: str = "x") -> Edit:
 
 
 def noise(by_m: float, at: slice) -> Edit:
-    """More noise, and the decision variable that follows."""
     return all_of(*(cells(name, lambda old: old + by_m, at) for name in ("noise_m", "decision_variable_m")))
 
 
 def without_event(kind: str, run: str = RUN) -> Edit:
-    """Without the first event of a kind, and one less in the counts."""
-
     def edit(folder: Path) -> None:
         with edited_entries(folder, run) as entries:
             for entry in entries:
@@ -174,7 +159,6 @@ def without_event(kind: str, run: str = RUN) -> Edit:
 
 
 def trigger_late(folder: Path) -> None:
-    """The row of the trigger is left out, and the event put to the next one."""
     frame = read_table(folder)
     row = int(np.flatnonzero(np.diff(frame[f"{UGV}.mode"]) == 1.0)[0])
     late = float(frame["t_s"].iloc[row + 1])
@@ -185,8 +169,6 @@ def trigger_late(folder: Path) -> None:
 
 
 def unnamed(name: str) -> Edit:
-    """A file outside the folder, in the list of files."""
-
     def edit(folder: Path) -> None:
         (folder.parent / name).write_bytes(b"")
         report("files", f"../{name}", value=hashlib.sha256(b"").hexdigest())(folder)
@@ -195,7 +177,6 @@ def unnamed(name: str) -> Edit:
 
 
 def another_map(folder: Path) -> None:
-    """A file of a map that the scenario did not read."""
     (folder / "map").mkdir()
     write(folder / "map" / "lab.yaml", b"image: lab.pgm")
     everywhere("map", value={"cells": {"sha256": {}, "rectangles": []}})(folder)
@@ -274,8 +255,6 @@ RULES: dict[str, tuple[str, Edit]] = {
 
 
 def special(name: str, make: Callable[[Path], Any]) -> Edit:
-    """What is not a regular file in the place of a file."""
-
     def edit(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
         make(folder / name)
@@ -284,8 +263,6 @@ def special(name: str, make: Callable[[Path], Any]) -> Edit:
 
 
 def margin(text: bytes) -> Edit:
-    """Raw text in the place of a number."""
-
     def edit(folder: Path) -> None:
         claim("SAFE-TRACE", margin="MARGIN")(folder)
         words_in = (folder / "report.json").read_bytes()
@@ -314,7 +291,6 @@ def states(change: Callable[[pa.Table], pa.Table]) -> Edit:
 
 
 def times(values: list[Any], kind: pa.DataType | None = None) -> Edit:
-    """Other times in the states: the values, again and again."""
     return states(lambda table: table.set_column(0, "t_s", pa.array(values * len(table), kind)))
 
 

@@ -33,39 +33,33 @@ Edit = Callable[[Path], None]
 
 
 def write(path: Path, content: bytes) -> None:
-    """Put a file in the place of another."""
     path.unlink(missing_ok=True)
     path.write_bytes(content)
 
 
 def trace(folder: Path, run: str = RUN) -> Path:
-    """The folder of a trace."""
     return folder / "trace" / run
 
 
 @contextlib.contextmanager
 def edited_json(path: Path) -> Iterator[Any]:
-    """The value of a JSON file, to be changed in place."""
     value = json.loads(path.read_bytes())
     yield value
     write(path, json.dumps(value, ensure_ascii=False).encode())
 
 
 def edited_report(folder: Path) -> contextlib.AbstractContextManager[Any]:
-    """report.json, to be changed in place."""
     return edited_json(folder / "report.json")
 
 
 @contextlib.contextmanager
 def edited_entries(folder: Path, run: str = RUN) -> Iterator[list[Any]]:
-    """A run's entry in report.json, and its meta.json, to be changed in place."""
     with edited_report(folder) as report, edited_json(trace(folder, run) / "meta.json") as meta:
         yield [report["runs"][run], meta]
 
 
 @contextlib.contextmanager
 def edited_scenarios(folder: Path) -> Iterator[list[Any]]:
-    """The resolved scenario in report.json and in each meta.json, to be changed in place; its digest follows."""
     with contextlib.ExitStack() as stack:
         report = stack.enter_context(edited_report(folder))
         metas = [stack.enter_context(edited_json(path)) for path in sorted(folder.glob("trace/*/meta.json"))]
@@ -75,17 +69,14 @@ def edited_scenarios(folder: Path) -> Iterator[list[Any]]:
 
 
 def claim_of(report: Any, claim: str, run: str = RUN) -> Any:
-    """A claim's entry in report.json."""
     return next(entry for entry in report["claims"] if (entry["id"], entry["run"]) == (claim, run))
 
 
 def read_table(folder: Path, table: str = "states", run: str = RUN) -> pd.DataFrame:
-    """A table of a trace."""
     return pd.read_parquet(trace(folder, run) / f"{table}.parquet")
 
 
 def write_table(folder: Path, frame: pd.DataFrame, table: str = "states", run: str = RUN) -> None:
-    """Put a table in the place of another."""
     buffer = io.BytesIO()
     frame.to_parquet(buffer, index=False)
     write(trace(folder, run) / f"{table}.parquet", buffer.getvalue())
@@ -94,27 +85,23 @@ def write_table(folder: Path, frame: pd.DataFrame, table: str = "states", run: s
 
 @contextlib.contextmanager
 def edited_table(folder: Path, table: str = "states", run: str = RUN) -> Iterator[pd.DataFrame]:
-    """A table, to be changed in place."""
     frame = read_table(folder, table, run)
     yield frame
     write_table(folder, frame, table, run)
 
 
 def seal(folder: Path, run: str = RUN) -> None:
-    """Make the digests in a meta.json right."""
     with edited_json(trace(folder, run) / "meta.json") as meta:
         for name in meta["files"]:
             meta["files"][name] = hashlib.sha256((trace(folder, run) / name).read_bytes()).hexdigest()
 
 
 def copy(report: Path, folder: Path) -> Path:
-    """A new copy of a report, to be forged."""
     shutil.rmtree(folder, ignore_errors=True)
     return Path(shutil.copytree(report, folder))
 
 
 def mend(folder: Path) -> None:
-    """Make the list of files right, if there is a report to put it into."""
     if not (folder / "report.json").is_file():  # nobody reads a pipe to its end
         return
     with contextlib.suppress(OSError, ValueError, TypeError, RecursionError), edited_report(folder) as report:
@@ -140,11 +127,6 @@ def attempt(report: Path, edit: Edit, *, mended: bool = True) -> tuple[int, str]
     """Forge a copy of a report, beside it, and check it: the exit code, and a line for each check that fails.
 
     The report is made again from its traces only if the checker agrees.
-
-    Args:
-        report: folder of the report.
-        edit: the forgery.
-        mended: whether the list of files is made right afterwards.
     """
     folder = forged(report, edit, mended=mended)
     try:
@@ -202,7 +184,6 @@ REMEMBERED = {
 
 
 def judged(scenario: Scenario, traces: Sequence[Trace]) -> list[Verdict]:
-    """As `judge_all`, but equal work is done once."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             judging,

@@ -78,14 +78,12 @@ def test_every_rule_of_the_checker_has_a_forgery() -> None:
 
 
 def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """The place of every value of a JSON document that has no parts."""
     parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, part in parts:
         yield from leaves(part, (*path, key)) if isinstance(part, (dict, list)) else [(*path, key)]
 
 
 def items(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """The place of every item of a list in a JSON document."""
     for key, part in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
         if isinstance(value, list):
             yield (*path, key)
@@ -93,7 +91,6 @@ def items(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def container(value: Any, path: tuple[Any, ...]) -> Any:
-    """What holds the value at a place."""
     for key in path[:-1]:
         value = value[key]
     return value

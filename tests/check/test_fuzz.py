@@ -62,7 +62,6 @@ def _places(value: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def _changed(content: bytes, change: Change) -> bytes:
-    """The content with the change; a file that is not JSON is changed in its bytes."""
     with contextlib.suppress(ValueError, RecursionError):
         if change.file.endswith(".json") and change.how not in ("bytes", "cut"):
             value = json.loads(content)

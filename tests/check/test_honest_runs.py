@@ -29,7 +29,6 @@ KINDS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {
 
 
 def drawn(method: str, changes: dict[str, dict[str, Any]], periods: int, first: int) -> Scenario:
-    """The first valid one of a small team."""
     for number in range(first, first + 100):
         data = draw(number)
         data["duration_s"] = min(12.0, periods * data["control"]["period_s"])

@@ -3,7 +3,7 @@
 import cmath
 import math
 from fractions import Fraction
-from itertools import combinations, pairwise
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -19,7 +19,6 @@ from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair, pairs_of
 from airground_drake.check.shapes import POINT, ROWS, Shape, boxes_of, shape_of, split
 from airground_drake.model.geometry import outline
-from airground_drake.scenario import shapes
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.schema import Obstacle
@@ -128,22 +127,6 @@ def test_the_normal_bounds_the_distance_after_any_step(
                     assert (after >= here + steps @ n / np.linalg.norm(n) - 1e-9).all()
 
 
-@given(polygons())
-def test_no_union_is_left_out_if_all_pairs_are_tried_again_after_each(given_corners: Corners) -> None:
-    corners = [(x, y) for x, y in given_corners][:: 1 if shapes.area([(x, y) for x, y in given_corners]) > 0.0 else -1]
-    parts = [[*triangle] for triangle in shapes._triangles(corners)]
-
-    def first() -> tuple[int, int, list[shapes.Corner]] | None:
-        pairs = combinations(range(len(parts)), 2)
-        return next(((i, j, both) for i, j in pairs if (both := shapes._united(parts[i], parts[j]))), None)
-
-    while found := first():
-        i, j, parts[i] = found
-        del parts[j]
-    if not shapes._is_convex(corners):
-        assert shapes.split(corners) == [shapes._without_straight_corners(part) for part in parts]
-
-
 @given(corners=polygons(), at=st.sampled_from([[], [0.0, 0.0, 0.0], [1.5, -0.7, 0.0]]), turn=st.floats(-4.0, 4.0))
 def test_parts_are_those_of_the_controllers(corners: Corners, at: list[float], turn: float) -> None:
     body = AT_ORIGIN | {"polygon_m": corners, "position_m": at, "heading_rad": turn}
@@ -231,14 +214,3 @@ def test_the_step_between_two_slices_belongs_to_one() -> None:
     assert POINT.least_m(way) == pytest.approx(1.0, abs=1e-10)
     assert POINT.within(way, 1.1)[1].nonzero()[0].tolist() == [ROWS - 1]
     assert POINT.bounds_m(*boxes_of(way)).min() <= 1.0
-
-
-@examples(20)
-@given(seed=st.integers(0, 2**32 - 1), rows=st.integers(2, 3 * ROWS), step=st.floats(0.01, 3.0))
-def test_the_least_distance_of_points_has_a_closed_form(seed: int, rows: int, step: float) -> None:
-    rng = np.random.default_rng(seed)
-    way = rng.normal(size=3) + np.cumsum(step * rng.normal(size=(rows, 3)), axis=0)
-    start, step = way[:-1], np.diff(way, axis=0)
-    share = np.clip(-(start * step).sum(axis=1) / (step**2).sum(axis=1), 0.0, 1.0)
-    exact = np.linalg.norm(start + share[:, None] * step, axis=1).min()
-    assert POINT.least_m(way) == pytest.approx(exact, abs=1e-10)

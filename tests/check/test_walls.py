@@ -109,7 +109,6 @@ def test_honest_runs_stop_at_the_distance_and_keep_it(report_of: Callable[[str],
 def test_positions_among_walls_are_judged(
     report_of: Callable[[str], Path], name: str, by_m: float, tmp_path: Path
 ) -> None:
-    """As they are, and beside an obstacle that is kept farther away from."""
     folder = report_of(name)
     frame, scenario = read_table(folder), json.loads((folder / "report.json").read_bytes())["scenario"]["resolved"]
     columns = ["x_m", "y_m", "z_m"]
@@ -125,8 +124,6 @@ def test_positions_among_walls_are_judged(
 
 
 def ahead(by_m: float) -> Edit:
-    """Ahead at one row, with commands that lead there and back."""
-
     def edit(folder: Path) -> None:
         with edited_table(folder) as frame, edited_table(folder, "samples") as samples:
             row, sample = len(frame) - 11, len(samples) - 10

@@ -92,7 +92,7 @@ KEYS = st.sampled_from([*attention.ROLES, *TOO_NEAR, *END, "t_s", "hypothesis", 
 VALUES = st.none() | st.booleans() | st.floats() | st.text() | st.sampled_from(["ugv1", "uav", "obstacle_1"])
 
 
-@settings(max_examples=30)
+@settings(max_examples=12)
 @given(found=st.dictionaries(KEYS, VALUES | st.lists(VALUES)), margin=st.none() | st.floats(allow_nan=False))
 def test_whatever_a_third_party_claim_found_is_told(
     scenario: Scenario, traces: dict[str, Trace], found: dict[str, Any], margin: float | None

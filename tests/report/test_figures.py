@@ -67,7 +67,7 @@ def team(scenario: Scenario, size: int, *, triggered: str = "") -> tuple[Scenari
     return own, {"a": along(asdict(own), "a", [*ways, FLIGHT], happened)}
 
 
-@settings(max_examples=5)
+@settings(max_examples=2)
 @given(
     size=st.sampled_from([1, 2, 7, 13]),
     scale_m=st.sampled_from([0.0, 1e-12, 1e-3, 10.0, 1e4, 1e9]),

@@ -47,7 +47,6 @@ SMALL_DATA: dict[str, Any] = yaml.safe_load(SMALL)
 
 
 def edit(data: dict[str, Any], key: str, value: object) -> dict[str, Any]:
-    """A copy of plain data with a dotted key set, added or deleted."""
     data = copy.deepcopy(data)
     *parents, last = key.split(".")
     node: Any = data
@@ -63,12 +62,10 @@ def edit(data: dict[str, Any], key: str, value: object) -> dict[str, Any]:
 
 @functools.cache
 def case_a() -> tuple[Scenario, str]:
-    """The shipped scenario, loaded once; not to be changed."""
     return load("case_a")
 
 
 def message(name_or_path: str, overrides: list[str] | None = None) -> str:
-    """The one-line message that loading fails with."""
     with pytest.raises(ScenarioError) as caught:
         load(name_or_path, overrides or [])
     text = str(caught.value)

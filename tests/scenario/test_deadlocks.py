@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from feasible import joint_plan, shortest_length
 from scenario.cases import DEADLOCKS
-from timeline import kinds
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.geometry.outline import as_tuple
@@ -13,7 +12,6 @@ from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.components import make_map, positions
-from airground_drake.sim.simulation import simulate
 
 ROOM_M = 0.1
 MANY_POINTS = 50
@@ -66,9 +64,3 @@ def test_the_map_of_the_warehouse_is_wrong() -> None:
     real = {as_tuple(row) for each in scenario.barriers.values() for row in outlines_of(scenario, each)}
     on_map = set(map(as_tuple, make_map(scenario, scenario.uav)[0]))
     assert (len(real - on_map), len(on_map - real)) == (1, 1)
-
-
-def test_two_are_stuck_without_the_uav() -> None:
-    alone = simulate(load("swap", ["duration_s=15"]), "a")
-    assert [kinds(alone, ugv) for ugv in alone.ugvs] == [["trigger"], ["trigger"]]
-    assert np.linalg.norm(alone.position("ugv1")[-1] - alone.position("ugv2")[-1]) == pytest.approx(1.0, abs=1e-6)

@@ -81,16 +81,3 @@ def test_more_seeds_are_more_work_in_the_same_memory() -> None:
     assert (thrice.work, thrice.memory) == (3.0 * once.work, once.memory)
     with pytest.raises(LimitError):
         within(small(), DEFAULT_LIMITS, 10**6)
-
-
-def test_long_searches_are_announced() -> None:
-    """Four UGVs among 57 obstacles: method (c) takes minutes where the others take seconds."""
-    crowd = small("c")
-    ugv = next(iter(crowd.ugvs.values()))
-    crowd = replace(
-        crowd, duration_s=30.0, ugvs={f"u{i}": ugv for i in range(4)},
-        obstacles={f"o{i}": Obstacle([0.0, 3.0 + i, 0.0]) for i in range(57)},
-    )  # fmt: skip
-    assert "method (c) searches for a plan at up to 2.4e+03 decisions: about" in estimate(crowd).announcement
-    assert estimate(replace(crowd, runs={"d": Run(method="d")})).announcement == ""
-    assert estimate(small("c")).announcement == ""

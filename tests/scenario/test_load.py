@@ -18,7 +18,6 @@ from airground_drake.scenario.schema import Obstacle, Uav
     "title", ["Case A", "1e5", "1:30", "yes", "0x1f", ".5", "~", "+1", "", "\u00c4: # \U0001f697 \\"]
 )
 def test_resolved_round_trips(title: str, write: Write) -> None:
-    """Whatever text looks like by the rules of YAML 1.1 or 1.2."""
     scenario = replace(case_a(), title=title)
     assert load(write(text_of(resolved(scenario)))) == scenario
     assert validated(case_a(), {"title": title}).title == title

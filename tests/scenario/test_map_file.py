@@ -1,7 +1,6 @@
 """The key `map`: files of map_server become an obstacle; every mistake is one line."""
 
 import copy
-import io
 import math
 import os
 from collections.abc import Callable
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from PIL import Image
 
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.files import sha256
@@ -64,7 +62,6 @@ def image() -> np.ndarray:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a scenario and, in another one in there, its map."""
     (tmp_path / "maps").mkdir()
     grey = image()
     (tmp_path / "maps/room.pgm").write_bytes(b"P5\n%d %d\n255\n" % grey.shape[::-1] + grey.tobytes())
@@ -80,7 +77,6 @@ def write(folder: Path, **changed: object) -> Path:
 
 
 def in_the_way(scenario: Scenario, x: float, y: float) -> bool:
-    """Whether a point in the plane is in the map's obstacle."""
     rows = outlines_of(scenario, scenario.barriers["map"])
     return bool((convex.distances(rows, np.array([x, y, 0.0]), True) < 0.0).any())
 
@@ -113,13 +109,6 @@ def test_free_unknown_cells_and_the_keys_of_the_obstacle(folder: Path) -> None:
     assert {(row[outline.BASE], row[outline.TOP], row[outline.GAP]) for row in rows} == {(0.0, 1.5, 0.1)}
 
 
-def test_a_heading_turns_the_map_about_its_origin(folder: Path) -> None:
-    about = ABOUT | {"origin": [10.0, 20.0, math.pi / 2.0]}
-    (folder / "maps/room.yaml").write_text(yaml.safe_dump(about), encoding="utf-8")
-    frame = map_file.read(folder / "maps/room.yaml").frame
-    assert frame.corners(np.array([[0, 1, 0, 2]])).tolist() == [[[10.0, 20.0], [10.0, 21.0], [9.5, 21.0], [9.5, 20.0]]]
-
-
 def test_the_scenario_of_a_report_needs_no_file(folder: Path) -> None:
     scenario = load(folder / "scenario.yaml")
     data = resolved(scenario)
@@ -142,20 +131,6 @@ def test_the_digest_depends_on_the_image(folder: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"\xcd", b"\xcc"))  # in the way as before
     after = load(folder / "scenario.yaml")
     assert after.digest != before
-
-
-def test_a_png_is_read_as_a_pgm(folder: Path) -> None:
-    expected = load(folder / "scenario.yaml").map
-    stream = io.BytesIO()
-    Image.fromarray(image()).save(stream, "PNG")
-    (folder / "maps/room.png").write_bytes(stream.getvalue())
-    (folder / "maps/room.yaml").write_text(yaml.safe_dump(ABOUT | {"image": "room.png"}), encoding="utf-8")
-    found = load(folder / "scenario.yaml").map
-    assert expected is not None
-    assert found is not None
-    assert expected.cells is not None
-    assert found.cells is not None
-    assert found.cells.rectangles == expected.cells.rectangles
 
 
 def changing(**keys: object) -> Callable[[Path], object]:

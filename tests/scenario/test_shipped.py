@@ -23,7 +23,6 @@ SHORT = (("dwell", "a"), ("dwell", "d"), ("contact", "d"), ("forklift", "d"))
 
 @pytest.fixture(scope="module")
 def verdicts(run: Callable[[str, str], Trace]) -> dict[str, dict[str, Verdict]]:
-    """By `scenario run` and claim."""
     judged = {f"{scenario} {name}": judge(run(scenario, name)) for scenario, name in SHORT}
     return {of: {verdict.claim.id: verdict for verdict in found} for of, found in judged.items()}
 

@@ -16,7 +16,6 @@ BOTH = {"north": NORTH, "south": SOUTH}
 
 
 def of(uavs: object, **more: object) -> dict[str, Any]:
-    """The small scenario with these UAVs, 1 m apart."""
     data = edit(edit(edit(SMALL_DATA, "uav", DELETE), "uavs", uavs), "safe_distance.uav_m", 1.0)
     for key, value in more.items():
         data = edit(data, key.replace("__", "."), value)

@@ -10,7 +10,7 @@ from scenario.cases import SMALL_DATA, Write, edit, message
 from airground_drake.base.errors import ScenarioError
 from airground_drake.scenario import json_schema, validate
 from airground_drake.scenario.load import load, validated
-from airground_drake.scenario.rounding import TOLERANCE_M, Rounding
+from airground_drake.scenario.rounding import TOLERANCE_M
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M
 
@@ -69,7 +69,6 @@ def test_robots_start_and_end_within_the_arena(key: str) -> None:
 
 
 def test_one_tolerance() -> None:
-    """Claims about a run share no code with the scenario's side."""
     assert TOLERANCE_M == DISTANCE_TOLERANCE_M
 
 
@@ -98,12 +97,3 @@ def test_the_rounding_bound_names_what_is_to_blame_and_what_is_allowed(key: str,
     with pytest.raises(ScenarioError, match=f"{key}:") as caught:
         load("case_a", {key: value})
     load("case_a", {key: float(re.findall(r"at (?:most|least) ([\d.e+-]+) ", str(caught.value))[0])})
-
-
-def test_the_bound_on_rounding_grows_with_what_it_is_made_of() -> None:
-    bound = Rounding(reach=5.0, closing=10.0, period=0.05, gain=3.0)
-    assert bound.of_a_step(20.0, 60.0) > 1.5 * bound.of_a_step(20.0, 30.0)
-    assert bound.of_a_step(40.0, 30.0) > bound.of_a_step(20.0, 30.0)
-    assert bound._replace(gain=1.5).largest_extent(1.0) < bound.largest_extent(1.0)
-    extent = bound.largest_extent(30.0)
-    assert bound.of_a_step(extent, 30.0) / (3.0 * 0.05) == pytest.approx(TOLERANCE_M)

@@ -9,7 +9,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
-from airground_drake.scenario.load import load, own, shipped
+from airground_drake.scenario.load import load, shipped
 from airground_drake.sim import graphviz
 from airground_drake.sim.blocks import DecisionBlock
 from airground_drake.sim.components import stack_presets
@@ -32,7 +32,6 @@ def test_corners_of_two_presets_that_rounding_keeps_apart_are_one() -> None:
 
 
 def drawn(text: str) -> tuple[set[str], list[tuple[str, str]]]:
-    """The blocks of a picture, and its wires: the output port and the input port of each, with their blocks."""
     ports = {
         f"{block}:{port}": f"{block}.{re.sub('<.*?>', '', name)}"
         for block, table in re.findall(r"^(\w+) \[shape=none, border(.*?)^>\];", text, re.MULTILINE | re.DOTALL)
@@ -62,40 +61,6 @@ def test_the_picture_has_every_block_and_each_input_is_fed_by_the_signal_of_its_
         (source, port), signal = start.split("."), end.partition(".")[2]
         assert signal in (port, *unnamed.get(port, ())), (start, end)
         assert port not in unnamed or source.startswith(signal.partition("_")[0]) or source == "decision_noise"
-
-
-def test_what_is_sent_by_radio_is_dashed_recorded_signals_blue_and_no_wire_moves_a_block_to_the_left() -> None:
-    text = graphviz.dot(build_diagram(load("case_a"), "c"))
-    _, wires = drawn(text)
-    lines = re.findall(r"^\w+:\w+:e -> .*$", text, re.MULTILINE)
-    dashed = {wire for wire, line in zip(wires, lines, strict=True) if "style=dashed" in line}
-    assert dashed == {
-        ("intervention_planner.proposals", "ugv_controller.proposals"),
-        ("intervention_planner.proposals", "gatekeeper.proposals"),
-        ("gatekeeper.answers", "intervention_planner.answers"),
-        ("gatekeeper.reports", "intervention_planner.reports"),
-        ("ugv_controller.command", "uav_controller.ugv_command"),
-    }
-    blue = set(re.findall(rf'COLOR="{graphviz.RECORDED}">(\w+)<', text))
-    assert blue == {"bodies", "team_command", "y0", "decision_variable", "status", "executing"}
-    free = re.findall(r"^(\w+):\S+ -> (\w+):\S+ \[(?!.*constraint)", text, re.MULTILINE)
-    assert free
-    assert all(graphviz.ORDER.index(source) < graphviz.ORDER.index(target) for source, target in free)
-
-
-def test_blocks_say_their_equations_and_who_carries_them_and_no_port_dangles() -> None:
-    scenario = load("case_a")
-    for run, equations in (("c", "(21)-(26)"), ("c_literal", "(27)-(29)")):
-        text = graphviz.dot(build_diagram(own(scenario, run), "c"))
-        said = dict(re.findall(r"^<B>(\w+)</B><BR/>(.*)\n", text, re.MULTILINE))
-        assert equations in said["gatekeeper"]
-        assert said["event_trigger"] == "threshold, (20)<BR/><I>on the UAV</I>"
-        assert said["gatekeeper"].endswith("on the UGVs</I>")
-        assert {name for name, words in said.items() if "<I>" not in words} == {"reference", "vehicles"}
-        wires = re.findall(r"^(\w+:\w+):e -> (\w+:\w+):w", text, re.MULTILINE)
-        named = re.findall(r"^(\w+) \[shape=none, border(.*?)^>\];", text, re.MULTILINE | re.DOTALL)
-        inputs = {f"{block}:{port}" for block, table in named for port in re.findall(r'PORT="(u\d+)"[^>]*>\w', table)}
-        assert inputs == {end for _, end in wires}
 
 
 def test_the_text_does_not_depend_on_what_was_built_before() -> None:

@@ -58,7 +58,6 @@ def test_what_is_passed_between_two_rows_is_hit() -> None:
 @pytest.mark.parametrize("gap_m", [-1e-6, 1e-6])
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_bodies_collide_when_their_surfaces_come_near(share: float, gap_m: float) -> None:
-    """The radius of one, of the other, or of both; an obstacle or another robot."""
     trace = passing_by(-1.0)
     apart = {"o": 1.0, "uav": float(np.linalg.norm(trace.position("ugv1") - trace.position("uav"), axis=1).min())}
     assert apart["uav"] > 0.5

@@ -135,21 +135,6 @@ def test_noise_is_normal_independent_of_the_scenarios_intensity_and_leaks_at_its
     np.testing.assert_allclose(leaking[1:], kept * leaking[:-1] + steps[0], atol=1e-12)
 
 
-def test_bare_trigger_chatters_where_the_automaton_does_not(case_a: Scenario) -> None:
-    """A task error that rests at the threshold, under noise: what the hysteresis and the dwell are for."""
-    case_a.ugvs["ugv1"].preset.waypoints_m = [[3.3, 0.0, 0.0], [3.3, 8.1, 0.0]]
-    case_a.runs, case_a.reproduction = {"a": Run("a", expected={"LIVE-GOAL": "refuted"})}, []
-    case_a.decision.leak_1_s, case_a.decision.noise_m_sqrt_s = 2.0, 0.3
-    counts = {}
-    for case_a.decision.trigger in ("bare", "automaton"):
-        of_run = simulate(case_a, "a")
-        counts[case_a.decision.trigger] = len(times(of_run, "trigger"))
-        verdicts = {v.claim.id: v.status for v in judge(of_run, ["THR-TRIG", "ZENO-TRACE"])}
-        expected = "refuted" if case_a.decision.trigger == "bare" else "holds"
-        assert verdicts == {"THR-TRIG": "holds", "ZENO-TRACE": expected}
-    assert counts["bare"] > 2 * counts["automaton"]
-
-
 def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path: Path) -> None:
     of_run = run("case_a", "c")
     trace.save(of_run, tmp_path)

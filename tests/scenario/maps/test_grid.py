@@ -20,7 +20,6 @@ GRIDS = st.builds(
 
 
 def middle(grid: Grid, row: float, column: float) -> complex:
-    """The middle of a cell in the world."""
     x, y, heading = grid.frame.origin
     return complex(x, y) + grid.frame.cell_m * complex(column + 0.5, row + 0.5) * cmath.exp(1j * heading)
 
@@ -83,26 +82,6 @@ def test_around_a_closed_room_its_inside_is_filled() -> None:
     for robot in ((-9.0, 1.0), (2.0, 99.0)):
         assert Grid(room, Frame(1.0)).filled([robot]).occupied.all()
     assert np.array_equal(Grid(room, Frame(1.0)).filled([(1.5, 1.5), (-9.0, 1.0)]).occupied, room)
-
-
-def distance(cells: Cells, x: float, y: float) -> float:
-    """Distance of a point from the nearest of some cells, in cells."""
-    gaps = [
-        np.hypot(max(abs(x - column - 0.5) - 0.5, 0.0), max(abs(y - row - 0.5) - 0.5, 0.0))
-        for row, column in np.argwhere(cells)
-    ]
-    return float(min(gaps, default=np.inf))
-
-
-@given(grid=GRIDS, robot=st.tuples(st.integers(-1, 7), st.integers(-1, 7)), within=st.tuples(*2 * [st.floats(0, 1)]))
-def test_filling_changes_no_distance_of_whoever_can_be_there(
-    grid: Grid, robot: tuple[int, int], within: tuple[float, float]
-) -> None:
-    home = middle(grid, *robot)
-    filled = grid.filled([(home.real, home.imag)])
-    for row, column in np.argwhere(~filled.occupied):
-        x, y = column + within[0], row + within[1]
-        assert distance(filled.occupied, x, y) == distance(grid.occupied, x, y)
 
 
 @given(grid=GRIDS)

@@ -29,7 +29,6 @@ def drawn(boxes: list[tuple[int, int, int, int]], shape: tuple[int, int]) -> Cel
 
 
 def merged_runs(cells: Cells) -> int:
-    """Number of runs of occupied cells, those of consecutive rows that are equal taken together."""
     runs: list[set[tuple[int, int]]] = [set()]
     for row in cells.tolist():
         text = "".join(".#"[cell] for cell in row) + "."

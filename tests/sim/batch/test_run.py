@@ -67,7 +67,6 @@ def test_drawn_scenarios(scenario: Scenario) -> None:
 
 
 def sleepless(scenario: Scenario, run: str) -> object:
-    """The first difference of Drake's run to one in which planner and gatekeepers never sleep."""
     awake = simulate(scenario, run)
     with pytest.MonkeyPatch.context() as patch:
         for kind in (Planner, Gatekeepers, OutcomeGatekeepers):

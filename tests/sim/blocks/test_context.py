@@ -39,7 +39,6 @@ def advanced(diagram: Diagram, context: Context, until: float) -> Simulator:
 
 
 def ends(model: Model, context: Context) -> list[Any]:
-    """All recorded signals and all decisions."""
     signals = [model.diagram.GetOutputPort(name).Eval(context).tolist() for name in RECORDED]
     gatekeeper = model.gatekeeper
     assert gatekeeper is not None

@@ -51,7 +51,6 @@ class Path:
 
 
 def run(trigger: Trigger, path: Path, step: float, presets: Sequence[Motion] = ()) -> Array:
-    """Rows (4n, T) of the running trigger's status; references move by the presets, or stand still."""
     builder = DiagramBuilder()
     n = path.noise.shape[1]
     variable = builder.AddNamedSystem("decision_variable", DecisionVariable(world(n), presets))
@@ -88,7 +87,6 @@ def run(trigger: Trigger, path: Path, step: float, presets: Sequence[Motion] = (
 
 
 def times(status: Array, field: int, robot: int = 0) -> list[float]:
-    """Trigger (field 2) or release times (field 3) of a UGV."""
     return [float(t) for t in np.unique(status[FIELDS * robot + field]) if t >= 0.0]
 
 
@@ -96,7 +94,6 @@ TRIGGER = Trigger(zeta=3.0, release=1.0, dwell=0.0)
 
 
 def straight(*ends: Sequence[float]) -> Path:
-    """One UGV whose error is at these places, m, at 0, 1, ... s."""
     error = np.array(ends, dtype=np.float64)[:, None]
     return Path(np.arange(len(ends), dtype=np.float64), error, np.zeros((len(ends), 1)))
 
@@ -218,8 +215,6 @@ def test_a_sample_of_the_noise_moves_the_variable_by_what_its_period_is_worth(pe
 
 
 class Silent(DecisionBlock):
-    """Never has a reason to intervene."""
-
     def value(self, t: float, parts: Array) -> Array:
         return np.zeros(len(parts))
 
@@ -244,16 +239,6 @@ def test_a_decision_block_that_returns_0_triggers_nothing_and_does_not_pass_for_
     assert finding.evidence["ugvs"][0]["port_against_15"]["status"] == "not_run"
     passed_off = decided("THR-TRIG", replace(trace, meta={**trace.meta, "decision_block": ""}))
     assert passed_off.status == passed_off.evidence["ugvs"][0]["port_against_15"]["status"] == "refuted"
-
-
-def test_a_subclass_of_the_built_in_block_has_its_own_say() -> None:
-    class Nothing(DecisionVariable):
-        def value(self, t: float, parts: Array) -> Array:
-            return np.zeros(len(parts))
-
-    trace = simulate(load("case_a", {"duration_s": 15.0}), "b", decision_block=Nothing)
-    assert of_kind(trace, "trigger") == []
-    assert not trace.column("ugv1.decision_variable_m").any()
 
 
 class EndsOnly(DecisionVariable):

@@ -35,8 +35,6 @@ from airground_drake.verify.judging import judge
 
 @dataclass
 class Alternating:
-    """A route whose preference changes at every decision, by a wide margin."""
-
     calls: int = 0
 
     def solve(self, problem: Problem, budget: Budget) -> Solution:
@@ -46,9 +44,9 @@ class Alternating:
         return Solution(bool(self.calls % 2), "optimal", objective=least)
 
 
-@pytest.mark.parametrize("dwell", [0.0, 0.2, 1.0])
+@pytest.mark.parametrize("dwell", [0.0, 1.0])
 def test_opposite_answers_of_a_run_are_a_dwell_apart(case_a: Scenario, dwell: float) -> None:
-    case_a.gatekeeper.min_dwell_s, case_a.gatekeeper.route = dwell, "alternating"
+    case_a.gatekeeper.min_dwell_s, case_a.gatekeeper.route, case_a.duration_s = dwell, "alternating", 20.0
     with ROUTES.adding("alternating", Alternating):
         decisions = simulate(case_a, "c").decisions
     for _, of_one in decisions.groupby(["robot", "issued_s"]):
@@ -84,8 +82,6 @@ class Exchanging(Writing):
 
 
 class Exiting(Writing):
-    """Ends the program."""
-
     def write(self, problem: Problem) -> None:
         raise SystemExit(3)
 
@@ -130,7 +126,7 @@ class FailingLater:
 
 def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenario, run: Simulations) -> None:
     well = run("case_a", "c").decisions
-    case_a.gatekeeper.route = "failing"
+    case_a.gatekeeper.route, case_a.duration_s = "failing", 17.0
     with ROUTES.adding("failing", FailingLater):
         trace = simulate(case_a, "c")
         verdicts = judge(trace, ["GATE-PLAN"])
@@ -162,7 +158,7 @@ def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, mo
         return after_failure(problem, solution)
 
     monkeypatch.setattr(mpc_gatekeeper, "after_failure", listening)
-    case_a.gatekeeper.route = "failing"
+    case_a.gatekeeper.route, case_a.duration_s = "failing", 17.0
     with ROUTES.adding("failing", Listening):
         simulate(case_a, "c")
     plans = [solution.plan for solution in solutions if solution.plan is not None]
@@ -227,8 +223,6 @@ def test_messages_of_another_kind_are_refused_before_the_run(port: str, sent: ob
 
 
 class Announcing(LeafSystem):
-    """Sends one object for ever."""
-
     def __init__(self, sent: object) -> None:
         super().__init__()
         model = Value(object())
@@ -248,7 +242,6 @@ class Clock:
 
 
 def timed(monkeypatch: pytest.MonkeyPatch, clock: Clock) -> None:
-    """Let all gatekeepers use a clock."""
     make = components.make_rules
 
     def made(scenario: Scenario) -> Rules:
@@ -290,7 +283,7 @@ def test_with_no_time_left_the_better_constant_plan_decides(
     case_a: Scenario, monkeypatch: pytest.MonkeyPatch, route: str
 ) -> None:
     """A clock that jumps a whole sampling period at each reading: no solver is ever called."""
-    case_a.gatekeeper.budget, case_a.gatekeeper.route = "wall_clock", route
+    case_a.gatekeeper.budget, case_a.gatekeeper.route, case_a.duration_s = "wall_clock", route, 17.0
     timed(monkeypatch, Clock(tick=0.05))
     decisions = simulate(case_a, "c").decisions
     assert set(decisions["status"]) == {"budget_spent"}

@@ -23,7 +23,6 @@ from airground_drake.verify import judge
 def watched(
     scenario: Scenario, method: str, honest: Scenario | None = None, *, terminate: bool = False
 ) -> tuple[Violation | None, SimulatorStatus]:
-    """Run a monitored diagram; the monitor is made from the scenario `honest` if given."""
     monitor = make_monitor(honest or scenario, method, terminate=terminate)
     diagram = build_diagram(scenario, method, monitor=monitor)
     context = diagram.CreateDefaultContext()

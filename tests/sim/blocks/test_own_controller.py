@@ -75,8 +75,6 @@ class Unfed(Straight):
 
 
 class AtOnce(LeafSystem):
-    """It has the ports, but commands depend on positions at every instant."""
-
     def __init__(self, world: World, law: UgvLaw) -> None:
         super().__init__()
         n = len(world.names("ugv"))

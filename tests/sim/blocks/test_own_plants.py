@@ -1,6 +1,5 @@
 """Users' plants: Drake Systems with a declared drift and cover, which each run measures."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -20,7 +19,7 @@ from airground_drake.check.run import Run, _moves_as_commanded
 from airground_drake.model.plants.budget import Bounds, law_distance
 from airground_drake.scenario import plugins
 from airground_drake.scenario.load import load, resolved
-from airground_drake.sim.blocks.plant import OwnPlant, declared, first_order_plant
+from airground_drake.sim.blocks.plant import OwnPlant
 from airground_drake.sim.diagram import build_diagram
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
@@ -205,14 +204,6 @@ def test_a_plant_that_jumps_is_passed_on_as_going_straight_one_of_its_steps_late
     assert np.abs(place - due).max() < 1e-9
 
 
-@pytest.mark.parametrize("module", ["my-robots", "robots.2nd", "my robots", "__main__"])
-def test_a_plant_may_be_of_a_module_whose_name_is_no_identifier(module: str) -> None:
-    """As of a file my-robots.py: its name in the scenario is still valid."""
-    kind = type("Robot", (Robot,), {"__module__": module})
-    scenario = declared(load("minimal"), {"ugv1": OwnPlant(kind, 0.0, 0.0)})
-    assert scenario.ugvs["ugv1"].plant[0].kind == re.sub(r"[- ]|(?=2)", "_", module) + ":Robot"
-
-
 PERSON = {"radius_m": 0.3, "moves": {"waypoints_m": [[12.0, 0.0], [-6.0, 0.0]], "speed_m_s": 0.8}}
 
 
@@ -329,12 +320,3 @@ def test_keys_of_plants_are_checked(given: str, said: str) -> None:
 def test_a_drift_needs_a_gain() -> None:
     with pytest.raises(ScenarioError, match=r"without control\.avoidance_gain_1_s nothing makes up for a drift"):
         load("minimal", ["ugvs.ugv1.plant={kind: weak.py:Weak, drift_m_s: 0.1}", "control.avoidance_gain_1_s=0"])
-
-
-def test_first_order_as_a_plant_of_ones_own_is_declared_without_drift() -> None:
-    trace = of(lambda start: first_order_plant("ugv1", start))
-    assert (
-        trace.scenario.ugvs["ugv1"]
-        .plant[0]
-        .kind.endswith(":test_first_order_as_a_plant_of_ones_own_is_declared_without_drift_locals_lambda_")
-    )

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from oracles import faults_of
+from sim.blocks.both_programs import broken_rules, checked, found
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, ScenarioError
 from airground_drake.check import safety
-from airground_drake.check.run import Run
 from airground_drake.model.plants.budget import Bounds, law_distance, part_of_gain
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import Scenario
@@ -26,7 +26,6 @@ ABOUT_D = ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP", "GATE-PLAN", "THR-TRIG")
 
 
 def team(seed: int, links: dict[str, float] | None, plant: Any = None, **more: Any) -> Scenario:
-    """Four UGVs that start on a circle, at drawn places, and cross it; a rock in the middle of it."""
     draw = np.random.default_rng(seed)
     angles = 0.5 * np.pi * np.arange(4) + draw.uniform(-0.5, 0.5, 4)
     starts = np.round(4.0 * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles]), 3)
@@ -59,7 +58,6 @@ def run(seed: int, loss: float, delay_s: float = 0.0, method: str = "a") -> Trac
 
 
 def least_m(trace: Trace) -> float:
-    """The least distance of two UGVs, m: of a parabola's vertex or an end on each piece between two rows."""
     least = np.inf
     for k, first in enumerate(trace.ugvs):
         for second in trace.ugvs[k + 1 :]:
@@ -69,14 +67,6 @@ def least_m(trace: Trace) -> float:
             part = np.clip(-(start * way).sum(axis=1) / squared, 0.0, 1.0)
             least = min(least, float(np.linalg.norm(start + part[:, None] * way, axis=1).min()))
     return least
-
-
-def found(trace: Trace, *claims: str) -> dict[str, str]:
-    return {verdict.claim.id: verdict.status for verdict in judge(trace, claims or None)}
-
-
-def checked(trace: Trace) -> Run:
-    return Run(trace.run, resolved(trace.scenario), trace.events, trace.states, trace.samples)
 
 
 @pytest.mark.parametrize("loss", [0.1, 0.5])
@@ -95,8 +85,6 @@ def test_no_distance_breaks_and_the_theorem_covers_the_run(seed: int, loss: floa
 
 
 class Heedless(WaryUgvController):
-    """Acts on the last positions that it heard."""
-
     def _commanded(self, context: Any, t: float, positions: Array, *about: Any) -> Array:
         velocity, n = np.zeros((len(about[0]), 3)), len(about[0])
         last = self._last_places.Eval(context).reshape(n, n, 3)
@@ -112,12 +100,7 @@ def test_without_standing_distances_break_and_both_programs_say_which_rule(monke
     traces = [simulate(team(seed, {"loss": 0.5}), "a") for seed in range(4)]
     assert sum(least_m(trace) < APART_M - 1e-3 for trace in traces) >= 3
     for trace in traces:
-        (verdict,) = judge(trace, ["SAFE-HYP"])
-        assert verdict.status == "refuted"
-        assert verdict.counterexample["hypothesis"] == "standing without a message"
-        ours = safety.safe_hyp(checked(trace))
-        assert ours.because is not None
-        assert ours.because.rule == "standing without a message"
+        assert broken_rules(trace) == 2 * ["standing without a message"]
 
 
 def test_a_delay_of_up_to_a_period_is_free() -> None:
@@ -165,12 +148,7 @@ def forged(trace: Trace, column: str, value: Any, sample: int) -> Trace:
 def test_positions_elsewhere_than_announced_are_found() -> None:
     trace = run(0, 0.0, PERIOD_S, "d")
     moved = forged(trace, "ugv1.seen_x_m", trace.as_seen("ugv1", "ugv1")[40, 0] + 1e-6, 40)
-    (verdict,) = judge(moved, ["SAFE-HYP"])
-    assert verdict.status == "refuted"
-    assert verdict.counterexample["hypothesis"] == "announced position"
-    ours = safety.safe_hyp(checked(moved))
-    assert ours.because is not None
-    assert ours.because.rule == "announced position"
+    assert broken_rules(moved) == 2 * ["announced position"]
 
 
 def test_a_ugv_that_drives_without_a_message_of_a_near_one_is_found() -> None:
@@ -183,12 +161,7 @@ def test_a_ugv_that_drives_without_a_message_of_a_near_one_is_found() -> None:
         if np.linalg.norm((trace.position(first) - trace.position(second))[trace.sample_rows[k]]) < APART_M + 0.1
     )
     unheard = forged(trace, f"{first}.heard_{second}_s", trace.sampled("t_s")[k - 1], k)
-    (verdict,) = judge(unheard, ["SAFE-HYP"])
-    assert verdict.status == "refuted"
-    assert verdict.counterexample["hypothesis"] == "standing without a message"
-    ours = safety.safe_hyp(checked(unheard))
-    assert ours.because is not None
-    assert ours.because.rule == "standing without a message"
+    assert broken_rules(unheard) == 2 * ["standing without a message"]
     assert "positions" in faults_of(unheard)
 
 
@@ -207,11 +180,7 @@ def test_what_is_lost_depends_on_seed_and_sample_alone_and_starts_are_known() ->
 def test_a_position_that_is_heard_at_no_time_so_far_is_not_heard() -> None:
     trace = run(0, 0.5)
     samples = trace.samples.assign(**{"ugv1.heard_ugv2_s": 1e9})
-    (verdict,) = judge(replace(trace, samples=samples), ["SAFE-HYP"])
-    assert (verdict.status, verdict.counterexample["hypothesis"]) == ("refuted", "standing without a message")
-    ours = safety.safe_hyp(Run(trace.run, resolved(trace.scenario), trace.events, trace.states, samples))
-    assert ours.because is not None
-    assert ours.because.rule == "standing without a message"
+    assert broken_rules(replace(trace, samples=samples)) == 2 * ["standing without a message"]
 
 
 DRIFTS = {"ugvs.ugv1.plant": {"kind": "mine.py:Mine", "drift_m_s": 0.1}}
