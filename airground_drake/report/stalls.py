@@ -3,11 +3,10 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from scipy.optimize import nnls
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.base.errors import TraceError
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S
@@ -75,7 +74,7 @@ def _held_by(trace: Trace, ugv: str, sample: int, given: Inequalities) -> list[s
     shares, left = nnls(given.normal[binding].T, -wish / speed)
     if left > UNEXPLAINED:
         return []
-    columns: npt.NDArray[np.intp] = given.column[binding][shares > PUSH]
+    columns: Indices = given.column[binding][shares > PUSH]
     bodies = [*(parts.names[owner] for owner in parts.owner), *trace.robots]
     return list(dict.fromkeys(bodies[column] for column in columns.tolist()))
 

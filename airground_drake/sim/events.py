@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.motion import PeriodMotion
 from airground_drake.model.bodies.world import Body
@@ -117,7 +116,7 @@ def _box(way: PeriodMotion, body: Body) -> tuple[Array, Array]:
     return start + low, end + high
 
 
-def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> npt.NDArray[np.intp]:
+def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> Indices:
     """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them."""
     # apart: (T - 1, 3), m; shape: (k, W); within: m
     places = np.concatenate([apart.start, apart.end[-1:]])

@@ -6,10 +6,9 @@ from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import outline
 from airground_drake.model.trigger.automaton import FIELDS
@@ -96,7 +95,7 @@ def trace_of(
     return trace
 
 
-def distinct(t: Array, command: Array) -> npt.NDArray[np.intp]:
+def distinct(t: Array, command: Array) -> Indices:
     """Indices of rows (T,) at distinct times, for commands (3 r, T) of r robots."""
     # Among rows within MERGE_S of each other, the last row that has the command of the first is kept: the command that
     # led there.
@@ -169,7 +168,7 @@ def samples(
     return pd.DataFrame(columns)
 
 
-def sample_rows(t: Array, period_s: float) -> npt.NDArray[np.intp]:
+def sample_rows(t: Array, period_s: float) -> Indices:
     """Rows at the control samples before the last row, (S,): the nearest to each multiple of the period, s."""
     instants = np.arange(int((t[-1] - MERGE_S) / period_s) + 1) * period_s
     right = np.searchsorted(t, instants).clip(1, len(t) - 1)

@@ -51,11 +51,10 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from airground_drake.base import files
-from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.arrays import Array, Indices, read_only
 from airground_drake.base.errors import TraceError, one_line
 from airground_drake.base.values import NAME_PATTERN
 from airground_drake.model.bodies.motion import SAME_S
@@ -255,7 +254,7 @@ class Trace:
         return int(np.searchsorted(self.t, period * ceil((t_s - SAME_S) / period) - SAME_S)) if t_s else 0
 
     @property
-    def sample_rows(self) -> npt.NDArray[np.intp]:
+    def sample_rows(self) -> Indices:
         """Rows of `states` at the control samples, (S,).
 
         Raises:
@@ -263,7 +262,7 @@ class Trace:
         """
         return self.derived("sample rows", self._sample_rows)
 
-    def _sample_rows(self) -> npt.NDArray[np.intp]:
+    def _sample_rows(self) -> Indices:
         samples = self.sampled("t_s")
         rows = np.searchsorted(self.t, samples)
         if (rows >= len(self.t)).any() or (self.t[rows] != samples).any():

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.solvers import MathematicalProgram
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.base.compiling import njit
 from airground_drake.ugv.daqp_solver import Form
 from airground_drake.ugv.problem import Evaluation, Problem
@@ -115,7 +115,7 @@ class BinaryProgram:
 
 
 @njit(cache=True)
-def _may_bind(stage: npt.NDArray[np.intp], of_omega: Array, lower: Array) -> npt.NDArray[np.bool_]:
+def _may_bind(stage: Indices, of_omega: Array, lower: Array) -> Flags:
     """For which half-planes some plan, relaxed or not, needs more slack than for any other of the stage, and than 0."""
     # A row asks for the slack lower - of_omega . omega, (rows,). Over omega in [0, 1] the least difference of two rows
     # is found term by term.

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import daqp
 import numpy as np
-import numpy.typing as npt
 from pydrake.solvers import (
     ClpSolver,
     MathematicalProgram,
@@ -30,10 +29,7 @@ from pydrake.solvers import (
 )
 from pydrake.symbolic import Expression, Variable
 
-from airground_drake.base.arrays import Array
-
-Flags = npt.NDArray[np.bool_]
-Indices = npt.NDArray[np.intp]
+from airground_drake.base.arrays import Array, Flags, Indices
 
 # What a program may have. Visualization callbacks are not called.
 SUPPORTED = frozenset({

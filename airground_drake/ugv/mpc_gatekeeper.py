@@ -11,9 +11,8 @@ from time import thread_time
 from typing import Any, Self
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.base.errors import PluginError, described, one_line, raised_as, short
 from airground_drake.base.history import History
 from airground_drake.model.bodies.world import World
@@ -54,9 +53,9 @@ class GatekeeperState:
     decisions: tuple[GatekeeperDecision, ...] = ()  # those of the last sample with proposals, or of its repetition
     commitments: tuple[Commitment, ...] = ()  # under method (d), each UGV's tries and rests
     # under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m)
-    sensed: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    sensed: Flags = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     # of these, which are no news when they come into range: the UAV has heard of them, or nothing is asked of the UGV
-    quiet: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    quiet: Flags = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     # all decisions of the run so far
     made: History[GatekeeperDecision] = field(default_factory=History)
 
@@ -142,12 +141,12 @@ class Gatekeepers(abc.ABC):
             return None
         return self.kept([t], proposals, before)
 
-    def _in_range(self, t: float, position: Array) -> npt.NDArray[np.bool_]:
+    def _in_range(self, t: float, position: Array) -> Flags:
         """Which outlines at rest are there at time t, s, and within sensing range, (m,)."""
         still, reach = self._world.at(self._near, t).still, self.law.avoidance.sensing_range
         return np.asarray(convex.within(still, position[None], reach, True)[0])
 
-    def _beside(self, now: Inputs, i: int) -> npt.NDArray[np.intp]:
+    def _beside(self, now: Inputs, i: int) -> Indices:
         """Parts that move around a UGV: of all robots, and of obstacles within sensing range; rows of `parts`."""
         near, others = self._world.at(self._near, now.t), self._near.others[i]
         if len(self._world.moving) == len(self._world.robots):

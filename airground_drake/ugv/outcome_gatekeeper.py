@@ -18,9 +18,8 @@ from functools import cached_property
 from time import thread_time
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import World
@@ -93,7 +92,7 @@ class OutcomeGatekeepers(Gatekeepers):
         """Whether UGVs report obstacles that move."""
         return any(body.kind not in ROBOTS and body.name not in self._unreported for body in self._world.moving)
 
-    def _quiet(self, proposals: Proposals, after: GatekeeperState) -> npt.NDArray[np.bool_]:
+    def _quiet(self, proposals: Proposals, after: GatekeeperState) -> Flags:
         """Which outlines in range are no news, (n, m)."""
         quiet = after.sensed.copy()
         for i, (proposal, report) in enumerate(zip(proposals, after.reports, strict=True)):
@@ -140,9 +139,7 @@ class OutcomeGatekeepers(Gatekeepers):
             known = known & ~seen if (known & seen).any() else known
         return known | within(still, own, reach, True) if news_within(still, own, reach, True, known) else known
 
-    def _discovered(
-        self, sensed: npt.NDArray[np.bool_], before: GatekeeperState, i: int, proposal: Proposal
-    ) -> tuple[int, ...]:
+    def _discovered(self, sensed: Flags, before: GatekeeperState, i: int, proposal: Proposal) -> tuple[int, ...]:
         """Outlines that a UGV senses for the first time and that are not on the proposal's map."""
         if sensed is before.sensed or before.sensed.shape != sensed.shape:
             return ()
@@ -217,7 +214,7 @@ class OutcomeGatekeepers(Gatekeepers):
         )
         return seen, basis
 
-    def _believed(self, position: Array, sensed: npt.NDArray[np.bool_], proposal: Proposal) -> npt.NDArray[np.intp]:
+    def _believed(self, position: Array, sensed: Flags, proposal: Proposal) -> Indices:
         """Rows of the UAV's map that are out of a UGV's sight and that it has not sensed itself."""
         # Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Rows that
         # are no outlines are left out.

@@ -6,9 +6,8 @@ smaller and of the larger mode velocity.
 """
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.ugv.cost import Terms
 from airground_drake.ugv.problem import Problem
@@ -20,10 +19,10 @@ def nearest_in_reach(problem: Problem) -> Array:
     return np.clip(problem.centres, low[:, None], high[:, None])
 
 
-def within_reach(problem: Problem) -> npt.NDArray[np.bool_]:
+def within_reach(problem: Problem) -> Flags:
     """(N, m): False where no relaxed plan can come within the safe distance, so that (26d) costs nothing there."""
     squared = np.square(nearest_in_reach(problem) - problem.centres).sum(axis=2)
-    within: npt.NDArray[np.bool_] = squared < np.square(problem.distances)
+    within: Flags = squared < np.square(problem.distances)
     return within
 
 

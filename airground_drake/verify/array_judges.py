@@ -16,9 +16,8 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.base.compiling import njit
 from airground_drake.base.errors import TraceError
 from airground_drake.base.statuses import Status
@@ -44,8 +43,6 @@ SCREENED = ("SAFE-TRACE", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL")
 DOUBT_M = 1e-10
 # Margins of both judges differ by less, m or s: the times of events by the isolation, 5e-10 s, a few times over.
 SAME = 1e-8
-
-Indices = npt.NDArray[np.int64]
 
 
 class NoScreenError(Exception):

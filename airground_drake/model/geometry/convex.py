@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry.outline import BASE, CORNERS, COUNT, EXTENT, MIDDLE, TOP
 
@@ -129,7 +129,7 @@ def may_be_within(rows: Array, k: int, x: float, y: float, reach: float) -> bool
 
 
 @njit(cache=True)
-def within(rows: Array, positions: Array, reach: float, planar: bool) -> npt.NDArray[np.bool_]:
+def within(rows: Array, positions: Array, reach: float, planar: bool) -> Flags:
     """Which outlines (m, W) have a core within `reach`, m, of each of n positions (n, 3), m: (n, m)."""
     near, away = np.empty((len(positions), len(rows)), dtype=np.bool_), np.empty(3)
     for i in range(len(positions)):
@@ -140,7 +140,7 @@ def within(rows: Array, positions: Array, reach: float, planar: bool) -> npt.NDA
 
 
 @njit(cache=True)
-def news_within(rows: Array, positions: Array, reach: float, planar: bool, known: npt.NDArray[np.bool_]) -> bool:
+def news_within(rows: Array, positions: Array, reach: float, planar: bool, known: Flags) -> bool:
     """Whether `within` would find an outline that is not known yet; `known` is (n, m)."""
     away = np.empty(3)
     for i in range(len(positions)):
@@ -240,7 +240,7 @@ def approaches(row: Array, starts: Array, ends: Array, planar: bool) -> tuple[Ar
 
 
 @njit(cache=True)
-def points_are_free(points: Array, rows: Array, keep: Array) -> npt.NDArray[np.bool_]:
+def points_are_free(points: Array, rows: Array, keep: Array) -> Flags:
     """Which points (K, 2), m, in the plane z = 0 are `keep` (m,), m, from all cores (m, W): (K,)."""
     free, away = np.ones(len(points), np.bool_), np.empty(3)
     cells = _cells_of(points)
@@ -258,7 +258,7 @@ def points_are_free(points: Array, rows: Array, keep: Array) -> npt.NDArray[np.b
 
 
 @njit(cache=True)
-def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack: float) -> npt.NDArray[np.bool_]:
+def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack: float) -> Flags:
     """Which segments in the plane z = 0 keep out."""
     # One with an end too near to a core must come no nearer than that end.
     # begin, end: (K, 2), m; rows: (m, W); keep: (m,), m; slack: m
@@ -402,7 +402,7 @@ def clears(row: Array, reach: float, ax: float, ay: float, bx: float, by: float)
 
 
 @njit(cache=True)
-def ways_are_clear(begin: Array, end: Array, rows: Array, reach: Array) -> npt.NDArray[np.bool_]:
+def ways_are_clear(begin: Array, end: Array, rows: Array, reach: Array) -> Flags:
     """Which segments, from (K, 2) to (K, 2), m, in the plane z = 0 are `reach` (m,), m, from all cores (m, W): (K,)."""
     clear, last = np.ones(len(begin), np.bool_), 0
     for k in range(len(begin)):
@@ -418,7 +418,7 @@ def ways_are_clear(begin: Array, end: Array, rows: Array, reach: Array) -> npt.N
 
 
 @njit(cache=True)
-def in_the_way(begin: Array, end: Array, more: Array, rows: Array, reach: Array) -> npt.NDArray[np.bool_]:
+def in_the_way(begin: Array, end: Array, more: Array, rows: Array, reach: Array) -> Flags:
     """Which cores (m, W) are nearer than `reach` (m,), m, and `more` (K,), m, to one of K segments: (m,)."""
     blocking = np.zeros(len(rows), np.bool_)
     for m in range(len(rows)):
@@ -430,9 +430,7 @@ def in_the_way(begin: Array, end: Array, more: Array, rows: Array, reach: Array)
 
 
 @njit(cache=True)
-def arcs_are_covered(
-    centres: Array, radii: Array, begin: Array, sweep: Array, rows: Array, reach: Array
-) -> npt.NDArray[np.bool_]:
+def arcs_are_covered(centres: Array, radii: Array, begin: Array, sweep: Array, rows: Array, reach: Array) -> Flags:
     """Which arcs have every point nearer than `reach` (m,), m, to one of the cores (m, W): (K,)."""
     # An arc is divided into pieces. A piece is covered if its ends and the point where the tangents at its ends meet
     # are near to the same core: all that is near to a core is convex. So an arc may be covered and not found to be.

@@ -16,9 +16,8 @@ from functools import lru_cache
 from heapq import heappop, heappush
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry import convex, outline
 
@@ -27,8 +26,6 @@ FINEST = 0.1  # least spacing as a share of the least distance to keep
 MOST_SQUARES = 6  # number of squares in which a way is looked for, so that no obstacle far away makes it take long
 MOST_FIELDS = 8  # fields that are remembered; each takes 3 MB at most
 ROUNDING_M = 1e-9
-
-Indices = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +105,7 @@ def length_among(place: Array, goal: Array, rows: Array, keep: Array) -> float:
 
 
 @njit(cache=True)
-def _settled(free: npt.NDArray[np.bool_], gx: float, gy: float) -> tuple[Array, Indices]:
+def _settled(free: Flags, gx: float, gy: float) -> tuple[Array, Indices]:
     """Lengths from all nodes to a goal in units of the spacing, (N,), infinite without a way; next corners."""
     # free: (columns, lines)
     lines, count = free.shape[1], free.size
@@ -159,7 +156,7 @@ def _settled(free: npt.NDArray[np.bool_], gx: float, gy: float) -> tuple[Array, 
 
 
 @njit(cache=True)
-def _sees(free: npt.NDArray[np.bool_], ax: float, ay: float, bx: float, by: float) -> bool:
+def _sees(free: Flags, ax: float, ay: float, bx: float, by: float) -> bool:
     """Whether all nodes on both sides of a segment are free, in units of the spacing."""
     steep = abs(by - ay) > abs(bx - ax)
     if steep:

@@ -9,7 +9,7 @@ convex. So it is enough to walk through the overlapping obstacles and count cros
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry.convex import nearest, reached
 from airground_drake.model.geometry.outline import CORNERS, COUNT, EXTENT, MIDDLE
@@ -63,7 +63,7 @@ def _inner_points(rows: Array) -> Array:
 
 
 @njit(cache=True)
-def _root(parent: npt.NDArray[np.int64], odd: npt.NDArray[np.bool_], k: int) -> tuple[int, bool]:
+def _root(parent: npt.NDArray[np.int64], odd: Flags, k: int) -> tuple[int, bool]:
     """First obstacle of the cluster of obstacle k, and whether the way there crosses an odd number of times."""
     root, crossings = k, False
     while parent[root] != root:

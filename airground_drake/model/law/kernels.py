@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.base.compiling import njit
 from airground_drake.model.bodies.world import Neighbours
 from airground_drake.model.geometry.convex import may_be_within, nearest
@@ -51,13 +51,13 @@ def fill_half_spaces(
     mobility: Array,
     still: Array,
     parts: Array,
-    carrier: npt.NDArray[np.intp],
-    others: npt.NDArray[np.intp],
+    carrier: Indices,
+    others: Indices,
     places: Array,
     distance: Array,
     share: Array,
     layer: Layer,
-    which: npt.NDArray[np.intp],
+    which: Indices,
     normal: Array,
     bound: Array,
     retreat: Array,
@@ -339,7 +339,7 @@ def _squared(vectors: Array, k: int) -> float:
 
 
 @njit(cache=True)
-def _most_missed(velocity: Array, normal: Array, bound: Array, settled: npt.NDArray[np.bool_]) -> int:
+def _most_missed(velocity: Array, normal: Array, bound: Array, settled: Flags) -> int:
     """Index of the constraint that is missed most, by more than rounding, among those not settled; -1 without one."""
     missed_most, worst = -1, 0.0
     for k in range(len(bound)):

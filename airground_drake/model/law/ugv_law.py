@@ -14,9 +14,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.bodies.world import Neighbours
 from airground_drake.model.law.avoidance import Avoidance
@@ -171,7 +170,7 @@ def commands(
     positions: Array,
     track: Tracking,
     asked: AcceptedMotion,
-    executing: npt.NDArray[np.bool_],
+    executing: Flags,
     headings: Array,
     steering: Array,
 ) -> Array:

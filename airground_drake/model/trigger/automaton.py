@@ -19,9 +19,8 @@ from enum import IntEnum
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 
 SUPERVISING, INTERVENING, REFRACTORY = 0, 1, 2  # modes, as numba takes them
@@ -65,7 +64,7 @@ def step(status: Array, t: float, x: float, levels: Array) -> None:
 
 
 @njit(cache=True)
-def transitions_due(status: Array, t: float, spans: Array, levels: Array) -> npt.NDArray[np.bool_]:
+def transitions_due(status: Array, t: float, spans: Array, levels: Array) -> Flags:
     """For which UGVs a transition is due, (n,), by the least x since a step began, then the largest, (2n,), m."""
     zeta, release, dwell = levels[0], levels[1], levels[2]
     n = len(spans) // 2

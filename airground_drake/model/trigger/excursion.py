@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry.motion import Motion
 
@@ -140,7 +140,7 @@ def bends(corners: Corners, begin: float, end: float) -> tuple[int, int]:
 
 
 @njit(cache=True)
-def stretches(begun: Array, now: Array, corners: Corners) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+def stretches(begun: Array, now: Array, corners: Corners) -> tuple[Array, Array, Flags]:
     """A step cut at its corners: times (s,), s, task errors and noise then, (s, n, 4), m, and which UGVs bend, (n,)."""
     # Of a UGV whose reference bends, the error is that of the straight step, plus what the reference leaves it by.
     first, last = bends(corners, begun[0], now[0])

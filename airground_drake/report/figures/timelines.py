@@ -7,11 +7,10 @@ from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.report.metrics import events_of, gap_m
 from airground_drake.report.outcomes import Near, metres
 from airground_drake.report.view import canvas
@@ -62,7 +61,7 @@ class Clock(NamedTuple):
         knots, places = ([start, start + self.end - self.begin] for start in (self.begin, self.place))
         return np.asarray(np.interp(t, np.column_stack(knots).ravel(), np.column_stack(places).ravel()))
 
-    def shows(self, t: Array) -> npt.NDArray[np.bool_]:
+    def shows(self, t: Array) -> Flags:
         k = np.maximum(np.searchsorted(self.begin, t, side="right") - 1, 0)
         return np.asarray((self.begin[k] <= t) & (t <= self.end[k]))
 
@@ -308,7 +307,7 @@ def _time_axes(inner_in: float, above_in: Sequence[float], trace: Trace) -> tupl
     return figure, every
 
 
-def _bars(axes: Axes, trace: Trace, clock: Clock, active: npt.NDArray[np.bool_], share: float, **options: Any) -> None:
+def _bars(axes: Axes, trace: Trace, clock: Clock, active: Flags, share: float, **options: Any) -> None:
     """Bars over the times at which a held signal is true; row k holds its value since row k-1."""
     # They start at the bottom of the axes and reach up to a share of them.
     begins, ends = clock.at(trace.t[np.maximum(canvas.stretches(active) - 1, 0)]).T

@@ -5,12 +5,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from jinja2 import Template
 from pydrake.geometry import Meshcat, MeshcatAnimation
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.errors import ReplayError
 from airground_drake.report.html import digest, environment_of
 from airground_drake.report.replay.scene import FRAMES_PER_S, MAX_NAMED_BARRIERS, Scene, Sent
@@ -123,7 +122,7 @@ def _proposal(meshcat: Meshcat, animation: MeshcatAnimation, scene: Scene, propo
         _show(meshcat, animation, path, standing)
 
 
-def _known(positions: Array) -> npt.NDArray[np.bool_]:
+def _known(positions: Array) -> Flags:
     """At which frames a body was recorded, (F,)."""
     return np.asarray(np.isfinite(positions).all(axis=1))
 
@@ -146,7 +145,7 @@ def _move(
         meshcat.SetTransform(path, place)
 
 
-def _show(meshcat: Meshcat, animation: MeshcatAnimation, path: str, shown: npt.NDArray[np.bool_]) -> None:
+def _show(meshcat: Meshcat, animation: MeshcatAnimation, path: str, shown: Flags) -> None:
     """Keyframes where a body appears or disappears."""
     for k in np.flatnonzero(np.append(True, shown[1:] != shown[:-1])):
         animation.SetProperty(int(k), path, "visible", bool(shown[k]))

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.base.registry import method_of
 from airground_drake.report.interventions import interventions
 from airground_drake.report.view.stage import Robot, Stage, stage_of, states
@@ -47,7 +46,7 @@ class DrawnBody(Robot):
 
     positions: Array
     headings: Array
-    states: npt.NDArray[np.intp]
+    states: Indices
 
 
 @dataclass(frozen=True)

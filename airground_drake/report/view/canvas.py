@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 
 MAX_POINTS = 600  # maximum number of points of a line: two per pixel of a panel
 
@@ -107,12 +106,12 @@ def svg(figure: Figure) -> str:
     return buffer.getvalue()
 
 
-def stretches(active: npt.NDArray[np.bool_]) -> npt.NDArray[np.intp]:
+def stretches(active: Flags) -> Indices:
     """First row and the row after the last one of each stretch in which a signal (T,) is true, (n, 2)."""
     return np.flatnonzero(np.diff(active.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
 
 
-def thin(values: Array, limit: int = MAX_POINTS) -> npt.NDArray[np.intp]:
+def thin(values: Array, limit: int = MAX_POINTS) -> Indices:
     """Indices of at most `limit` rows of (T,) or (T, m), among them the ends and the extremes of each stretch."""
     rows = len(values)
     if rows <= limit:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 
 MOST_DASHES = 1000  # most dashes of a line
 MOST_LINES = 30  # about the most lines of a grid, per side
@@ -62,7 +62,7 @@ def prisms(outlines: Sequence[Array], height: float, *, lower: float = 0.0) -> M
     return Mesh(np.concatenate(vertices).T, np.concatenate([*tops, *walls], axis=1).astype(np.int32))
 
 
-def outer_edges(outlines: Sequence[Array], inside: Callable[[Array], npt.NDArray[np.bool_]], piece: float) -> Array:
+def outer_edges(outlines: Sequence[Array], inside: Callable[[Array], Flags], piece: float) -> Array:
     """The edges of polygons (K, 2), m, that are not inside of another one: ends of short segments, (2, S, 2), m."""
     # inside: (S, 2), m
     edges = list[Array]()

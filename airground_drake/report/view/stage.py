@@ -3,9 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.plants.plant import HEADING
 from airground_drake.model.trigger.automaton import Mode
@@ -107,7 +106,7 @@ class Barrier:
         """The edge of all of `safe` together: ends of short segments, (2, S, 2), m. For fine rims only."""
         reach = self.safe_m
 
-        def inside(points: Array) -> npt.NDArray[np.bool_]:
+        def inside(points: Array) -> Flags:
             return ~convex.points_are_free(points, self.parts, INWARD * reach)
 
         return outer_edges(self.safe, inside, 0.25 * float(reach.min()))
@@ -204,13 +203,13 @@ def arena_of(scenario: Scenario) -> tuple[Array, ...]:
     return tuple(low + inset + side * (high - low - 2.0 * inset) for inset in (0.0, gap))
 
 
-def states(trace: Trace, ugv: str, times: Array) -> npt.NDArray[np.intp]:
+def states(trace: Trace, ugv: str, times: Array) -> Indices:
     """Indices of STATES (F,) in force just before times (F,), s."""
     rows = np.minimum(np.searchsorted(trace.t, times - 1e-9), len(trace.t) - 1)
     return states_of(trace.executing(ugv)[rows], trace.column(f"{ugv}.mode")[rows])
 
 
-def states_of(executing: Array, mode: Array) -> npt.NDArray[np.intp]:
+def states_of(executing: Array, mode: Array) -> Indices:
     """Indices of STATES, from numbers of the proposals executed (-1: none) and the trigger's modes, of equal shapes."""
     return np.where(executing >= 0, INTERVENED, np.where(mode == Mode.INTERVENING, TRIGGERED, OWN))
 

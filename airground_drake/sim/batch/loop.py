@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.bodies.world import Neighbours
 from airground_drake.model.geometry import moving
@@ -32,7 +32,6 @@ from airground_drake.sim.blocks.decision import MOST_SHORT, SHORTEST_S
 from airground_drake.uav.halts import watched
 
 Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 # What is due at a tick, as bits.
 CONTROL, PLAN, GATE, NOISE = 1, 2, 4, 8
@@ -78,7 +77,7 @@ class Around(NamedTuple):
 class Accepted(NamedTuple):
     """The motions that UGVs execute, one after the other."""
 
-    executing: Bools  # (n,)
+    executing: Flags  # (n,)
     number: Array  # of the proposal, -1 without one, (n,)
     chosen: Array  # the directions of the intervention, (n, 3, 3)
     first: Ints  # rows of each motion, (n + 1,)
@@ -94,7 +93,7 @@ class State(NamedTuple):
     # the gatekeepers do, (5,).
     time: Array
     counts: Ints  # next tick, rows written, samples of noise used, what is due now, 1 after Python's update, (5,)
-    called: Bools  # which UGVs were triggered when the planner fell asleep, (n,)
+    called: Flags  # which UGVs were triggered when the planner fell asleep, (n,)
     place: Array  # of all bodies that move, (M, 3), m
     noise: Array  # (n,), m
     drawn: Array  # the sample in force, (n,)
@@ -108,7 +107,7 @@ class State(NamedTuple):
     begun: Array  # signals of the decision block when its step began, (1 + 5n,)
     now: Array  # and now
     reference: Array  # (6n,)
-    quiet: Bools  # what is no news to each UGV, (n, m)
+    quiet: Flags  # what is no news to each UGV, (n, m)
 
 
 class Log(NamedTuple):

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from airground_drake.base import files
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.errors import LogError
 from airground_drake.study.logs import text
 from airground_drake.study.logs.columns import WORDS, Columns, Place, Time, clock_of, columns, counts_frames, listed
@@ -240,7 +240,7 @@ def _dated(table: text.Table, time: Time) -> Time:
     return time._replace(unit="ns")
 
 
-def _stamps(table: text.Table, time: Time) -> tuple[Whole, Whole, npt.NDArray[np.bool_]]:
+def _stamps(table: text.Table, time: Time) -> tuple[Whole, Whole, Flags]:
     """Whole units, billionths, and whether a row has a stamp."""
     whole, nano, good = _exactly(table.cells[time.whole].tolist())
     if time.rest is not None:
@@ -249,7 +249,7 @@ def _stamps(table: text.Table, time: Time) -> tuple[Whole, Whole, npt.NDArray[np
     return whole, nano, good
 
 
-def _exactly(cells: list[str]) -> tuple[Whole, Whole, npt.NDArray[np.bool_]]:
+def _exactly(cells: list[str]) -> tuple[Whole, Whole, Flags]:
     """Decimal numbers as whole parts and billionths, exactly; other numbers as near as floating point has them."""
     whole, nano = np.zeros(len(cells), dtype=np.int64), np.zeros(len(cells), dtype=np.int64)
     good = np.zeros(len(cells), dtype=bool)

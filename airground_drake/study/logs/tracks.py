@@ -6,9 +6,8 @@ from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.errors import LogError, one_line
 from airground_drake.check.files import Json
 from airground_drake.check.limits import LARGEST
@@ -63,7 +62,7 @@ class Track:
     usual_s: float = 0.0  # usual time between two samples
 
     @property
-    def is_known(self) -> npt.NDArray[np.bool_]:
+    def is_known(self) -> Flags:
         """In which intervals between two samples the motion is known, (n - 1,)."""
         return (np.diff(self.t_s) <= self.gap_s * (1.0 + 1e-9)) & ~np.isin(self.t_s[1:], self.leaps_s)
 
@@ -367,13 +366,13 @@ def _of_one_recording(name: str, ns: Whole, places: Array, fastest_m_s: float) -
             )  # fmt: skip
 
 
-def _leaps(t_s: Array, places: Array, fastest_m_s: float) -> npt.NDArray[np.bool_]:
+def _leaps(t_s: Array, places: Array, fastest_m_s: float) -> Flags:
     """In which intervals a body leaps, (n - 1,)."""
     steps = np.hypot(*np.diff(places[:, :2], axis=0).T)
     return np.asarray((steps > LOST_M) & (steps > LOST * fastest_m_s * np.diff(t_s)))
 
 
-def _lost(t_s: Array, places: Array, fastest_m_s: float, start: Array | None) -> npt.NDArray[np.bool_]:
+def _lost(t_s: Array, places: Array, fastest_m_s: float, start: Array | None) -> Flags:
     """Which rows are where the body cannot have been, (n,)."""
     # They are between two leaps, fewer than the rows on either side or as few and at (0, 0), and the body can have gone
     # from one side to the other. At either end of the log they are at (0, 0), unless the body starts there.
