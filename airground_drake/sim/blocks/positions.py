@@ -17,7 +17,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import Neighbours, World
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.schema import Faults, Scenario
 from airground_drake.sim.blocks.controllers import UgvController, asked_at
 from airground_drake.sim.blocks.lifetime import weakly
 from airground_drake.sim.blocks.signals import declare_bodies
@@ -45,11 +45,11 @@ class Announcements(LeafSystem):
     Rate: one update per control period, from t = 0.
     """
 
-    def __init__(self, world: World, period: float, late: float = 0.0) -> None:
-        """With a share `late` of samples at which all have what was said a period before."""
+    def __init__(self, world: World, period: float, late: float = 0.0, seed: int = 1) -> None:
+        """With a share `late` of samples, drawn by the seed, at which all have what was said a period before."""
         super().__init__()
         self._ugvs, self._period, size = world.select("ugv"), period, 3 * len(world.moving)
-        self._late = late
+        self._late, self._seed = late, seed
         self._bodies = declare_bodies(self, world)
         self._command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
         self.DeclareDiscreteState(size + 1)
@@ -61,7 +61,7 @@ class Announcements(LeafSystem):
         *last, begun = context.get_discrete_state(0).value()
         if begun:
             sample = int((context.get_time() + SAME_S) / self._period)
-            on_time = random.Random(f"late/{sample}").random() >= self._late
+            on_time = random.Random(f"{self._seed}/late/{sample}").random() >= self._late
             led = on_time * self._period * self._command.Eval(context).reshape(-1, 3)
             places[self._ugvs] = np.reshape(last, (-1, 3))[self._ugvs] + led
         output.SetFromVector(places.ravel())
@@ -188,7 +188,8 @@ def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
     parts, renamed = dict[str, LeafSystem](), dict[System, Mapping[str, str]]()
     seen = "seen_by_uav" if scenario.sensing else "bodies"
     if link and link.delay_s:
-        parts["announcements"] = Announcements(world, period, scenario.faults.late if scenario.faults else 0.0)
+        late, seed = (scenario.faults or Faults()).late, scenario.channel.seed if scenario.channel else 1
+        parts["announcements"] = Announcements(world, period, late, seed)
         renamed[parts["announcements"]], published = {"bodies": published}, "announced"
     if not (scenario.channel and link and link.loss):
         return Between(UgvController(world, law), parts, renamed, published, seen)
