@@ -1,6 +1,7 @@
 """Who arrives when messages are late and lost: `python benchmarks/channel.py --seeds 3 --jobs 2 -o channel.jsonl`.
 
-Simulates method (d) of shipped scenarios with every delay, loss and seed of the channel. Each run becomes a line of
+Simulates method (d) of shipped scenarios with every delay, loss and seed of the channel. With `--between ugvs` the positions
+that UGVs tell each other are late and lost, under the asynchronous law, in place of messages from and to the UAV. Each run becomes a line of
 JSON; runs that the file has are not made again. At the end there is a table: when the last UGV arrived, or how many did
 not; with several seeds the latest. Below it: what was judged otherwise than in the run without a channel.
 """
@@ -21,10 +22,13 @@ SCENARIOS = ["case_a", "case_b", "lab", "swap", "crossing", "intersection", "doo
 CLAIMS = ("SAFE-TRACE", "SAFE-OWN", "SAFE-HYP", "LIVE-HYP")
 
 
-def run(scenario: str, delay_s: float, loss: float, seed: int) -> dict[str, Any]:
+def run(scenario: str, delay_s: float, loss: float, seed: int, between: str = "all") -> dict[str, Any]:
     """One run, in numbers."""
-    channel = f"channel={{delay_s: {delay_s}, loss: {loss}, seed: {seed}}}"
-    trace = simulate(load(scenario, [channel]), "d")
+    links = f"delay_s: {delay_s}, loss: {loss}"
+    changes = [f"channel={{{links}, seed: {seed}}}"]
+    if between == "ugvs":
+        changes = [f"channel={{seed: {seed}, ugvs: {{{links}}}}}", "control.law=asynchronous"]
+    trace = simulate(load(scenario, changes), "d")
     arrived = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
     sent = trace.messages.drop_duplicates(["kind", "number", "attempt"])
     return {
@@ -68,6 +72,7 @@ def main() -> None:
     parser.add_argument("--delays", nargs="+", type=float, default=[0.0, 0.1, 0.3, 1.0])
     parser.add_argument("--losses", nargs="+", type=float, default=[0.0, 0.1, 0.5])
     parser.add_argument("--seeds", type=int, default=1, help="of the channel: 1 up to this")
+    parser.add_argument("--between", choices=["all", "ugvs"], default="all", help="whose messages are late and lost")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("-o", "--output", type=Path, default=Path("channel.jsonl"))
     given = parser.parse_args()
@@ -75,7 +80,7 @@ def main() -> None:
     made = {(row["scenario"], row["delay_s"], row["loss"], row["seed"]) for row in rows}
     wanted = product(given.scenarios, given.delays, given.losses, range(1, given.seeds + 1))
     with ProcessPoolExecutor(given.jobs) as pool, given.output.open("a", encoding="utf-8") as file:
-        for future in as_completed([pool.submit(run, *each) for each in wanted if each not in made]):
+        for future in as_completed([pool.submit(run, *each, given.between) for each in wanted if each not in made]):
             rows.append(future.result())
             print(json.dumps(rows[-1]), file=file, flush=True)
     print("\n".join(table(sorted(rows, key=lambda row: given.scenarios.index(row["scenario"])))))

@@ -43,8 +43,9 @@ ANSWERING_S = 0.15  # time that an answer may take besides its way, s
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
     """The set-based avoidance layer."""
     control = scenario.control
-    stands = scenario.position_error_m > 0.0
-    return Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition, stands)
+    return Avoidance(
+        control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition, scenario.stands
+    )
 
 
 def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:
@@ -132,6 +133,7 @@ def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
     for pair in pairs:
         if pair.kind == "ugv":
             between = max(between, pair.gap_m - pair.promised_m - (more[pair.first] + more[pair.second]))
+    between += scenario.unsure_s * max(ugv.max_speed_m_s for ugv in scenario.ugvs.values())  # see `Neighbours.share`
     radius = np.array([ugv.radius_m + more[name] for name, ugv in scenario.ugvs.items()])
     return radius, scenario.safe_distance.ugv_m + between
 

@@ -36,6 +36,8 @@ _BUDGET = (
     "eps (1 - A h) <= A h (d_law - eps - W/A), and eps is below d_law - eps - W/A.",
     "The pair starts at d_law - eps - W/A or farther (Budget.measured_start).",
 )
+_HELD_EXACTLY = "Between its decisions, at most H apart, a robot moves straight at its command."
+_OFF = "Each decision meets the law towards its danger: every place of the other one until that one decides again."
 _PIECES = "Positions do not jump, and have the plant's derivatives inside the periods."
 _CHORD = "Speed and turning rate are those of chord steering, and constant in a period."
 _LAG = "The velocity goes towards the command at the rate (u - v)/tau."
@@ -327,6 +329,31 @@ _ALL = (
     Theorem(
         "Mixed.drive_kept", "ours", (),
         "A robot that drives towards a point, and beside a person, meets the hypotheses: they can be met.",
+    ),
+    Theorem(
+        "Async.asynchronous", "ours", ("SAFE-HYP",),
+        "Two robots that decide at instants of their own keep d, if each keeps off where the other can be until that "
+        "one decides again.",
+        (_HELD_EXACTLY, _OFF, "The first one knows where the second one starts.", "They start at d or farther."),
+        "How a pair gets out of d: what its decisions miss is lost for good, and is their sum.",
+    ),
+    Theorem(
+        "Async.towards_old", "ours", ("SAFE-HYP",),
+        "The law towards an old position keeps a robot off all places within rho of that position.",
+        ("The period is positive.",),
+    ),
+    Theorem(
+        "Async.old_positions", "ours", ("SAFE-HYP", "SAFE-BUDGET"),
+        "Two robots that act on positions that the other one had once keep d, whatever delays and losses made them "
+        "old.",
+        (_HELD_EXACTLY, "rho is V times the age of the position and the longest period of the other one, V its limit.",
+         "Each decision meets n.u >= -(D - d - rho)/H where D >= d + rho, or D n.u >= rho |u|, or stands.",
+         "Positions are exact, and none is from the future.", "The robots start at d or farther."),
+        "How a pair gets out of d. Positions with errors, plants that drift, bodies that are no discs.",
+    ),
+    Theorem(
+        "Async.half_shares_fail", "ours", (),
+        "Half shares are not enough for robots whose samples are half a period apart: they end inside d.",
     ),
     Theorem(
         "Gate.scaled_back", "(20)", ("SAFE-GATE",),
