@@ -1,9 +1,10 @@
 """Who arrives when messages are late and lost: `python benchmarks/channel.py --seeds 3 --jobs 2 -o channel.jsonl`.
 
-Simulates method (d) of shipped scenarios with every delay, loss and seed of the channel. With `--between ugvs` the positions
-that UGVs tell each other are late and lost, under the asynchronous law, in place of messages from and to the UAV. Each run becomes a line of
-JSON; runs that the file has are not made again. At the end there is a table: when the last UGV arrived, or how many did
-not; with several seeds the latest. Below it: what was judged otherwise than in the run without a channel.
+Simulates method (d) of shipped scenarios with every delay, loss and seed of the channel. With `--between ugvs` the
+positions that UGVs tell each other are late and lost, under the asynchronous law, in place of messages from and to the
+UAV. Each run becomes a line of JSON; runs that the file has are not made again. At the end there is a table: when the
+last UGV arrived, or how many did not; with several seeds the latest. Below it: what was judged otherwise than in the
+run without a channel.
 """
 
 import argparse

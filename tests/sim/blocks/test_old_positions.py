@@ -167,7 +167,7 @@ def test_plans_keep_what_the_law_keeps_and_the_budget_tells_it() -> None:
     assert planner.robot_distance == pytest.approx(APART_M + 4 * PERIOD_S * fastest)
     kept = [pair.unsure_m for pair in budget(scenario) if pair.kind == "ugv"]
     assert max(kept) == pytest.approx(4 * PERIOD_S * fastest)
-    assert SafeBudget().judge(scenario).status == "proved"
+    assert SafeBudget().judge(SafeBudget().inputs(scenario)).status == "proved"
 
 
 LAG = {"ugvs.ugv1.plant": {"kind": "lag", "time_constant_s": 0.1}}
