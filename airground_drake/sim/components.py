@@ -43,9 +43,8 @@ ANSWERING_S = 0.15  # time that an answer may take besides its way, s
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
     """The set-based avoidance layer."""
     control = scenario.control
-    return Avoidance(
-        control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition, scenario.stands
-    )
+    stands = scenario.stands
+    return Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition, stands)
 
 
 def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:

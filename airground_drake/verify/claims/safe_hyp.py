@@ -348,7 +348,7 @@ def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
     missed = missed_m(trace, pair.first, pair.second, pair.law_m) + missed_m(trace, pair.second, pair.first, pair.law_m)
     places = [trace.position(name)[0] for name in (pair.first, pair.second)]
     short = shortage(places[0], places[1], pair.law_m)
-    lost = sum(map(Fraction, missed.tolist()), short) if np.isfinite(missed).all() else Fraction(pair.law_m)
+    lost = sum(map(Fraction, missed.tolist()), short)
     if lost > Fraction(pair.law_m) / 2:
         return Guarantee(pair, missed, rounded_up(short), -inf, "the steps miss half of the distance in all")
     return Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))

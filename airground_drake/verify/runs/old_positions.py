@@ -6,7 +6,7 @@ theorem `old_positions` (coq/Async.v) asks of each step s that n.s >= d + rho - 
 """
 
 from fractions import Fraction
-from math import inf, isqrt
+from math import isqrt
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def unsure_m(trace: Trace, by: str, of: str) -> Array:
 
 
 def missed_m(trace: Trace, by: str, of: str, safe_m: float) -> Array:
-    """What the steps of a UGV miss of the law towards another one, (S,), m, rounded up; inf: there is no position."""
+    """What the steps of a UGV miss of the law towards another one, (S,), m, rounded up; all of it without a position."""
     ends, t, last = period_ends(trace), trace.t, float(last_period(trace))
     heard, way = heard_at(trace, by, of), trace.position(by)[ends]
     gone = np.diff(trace.position(of)[ends], axis=0) / np.diff(t[ends])[:, None]
@@ -61,7 +61,7 @@ def missed_m(trace: Trace, by: str, of: str, safe_m: float) -> Array:
     along = (offset * steps).sum(axis=1)
     keeps = safe_m + unsure
     met = (apart > keeps + SCREEN_M) & (along / np.maximum(apart, SCREEN_M) - keeps + apart > SCREEN_M)
-    missed = np.where(heard < 0, inf, 0.0)
+    missed = np.where(heard < 0, safe_m, 0.0)
     for k in np.flatnonzero((heard >= 0) & ~met & (length > 0.0)).tolist():
         missed[k] = rounded_up(_missed(offset[k], steps[k], Fraction(unsure[k]), Fraction(safe_m)))
     return missed

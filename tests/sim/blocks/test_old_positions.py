@@ -112,7 +112,7 @@ def test_a_position_that_is_older_than_it_was_is_found() -> None:
 
 def test_a_position_of_no_sample_so_far_is_found() -> None:
     trace = run(0, 0.1, 0.5)
-    for value in (1e9, float("nan"), 0.5 * PERIOD_S, -1.0):
+    for value in (1e9, 0.5 * PERIOD_S, -1.0):
         wrong = forged(trace, "ugv1.heard_ugv2_s", value, 20)
         assert found(wrong, "SAFE-HYP") == {"SAFE-HYP": "refuted"}
         ours = safety.safe_hyp(checked(wrong))
