@@ -48,7 +48,7 @@ def unsure_m(trace: Trace, by: str, of: str) -> Array:
 
 
 def missed_m(trace: Trace, by: str, of: str, safe_m: float) -> Array:
-    """What the steps of a UGV miss of the law towards another one, (S,), m, rounded up; all of it without a position."""
+    """What the steps of a UGV miss of the law towards another one, (S,), m, rounded up; all without a position."""
     ends, t, last = period_ends(trace), trace.t, float(last_period(trace))
     heard, way = heard_at(trace, by, of), trace.position(by)[ends]
     gone = np.diff(trace.position(of)[ends], axis=0) / np.diff(t[ends])[:, None]
