@@ -11,11 +11,12 @@ import argparse
 import json
 from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-from airground_drake.scenario.load import load
+from airground_drake.scenario.load import load, validated
 from airground_drake.sim.simulation import simulate
 from airground_drake.verify import judge
 
@@ -25,11 +26,12 @@ CLAIMS = ("SAFE-TRACE", "SAFE-OWN", "SAFE-HYP", "LIVE-HYP")
 
 def run(scenario: str, delay_s: float, loss: float, seed: int, between: str = "all") -> dict[str, Any]:
     """One run, in numbers."""
-    links = f"delay_s: {delay_s}, loss: {loss}"
-    changes = [f"channel={{{links}, seed: {seed}}}"]
-    if between == "ugvs":
-        changes = [f"channel={{seed: {seed}, ugvs: {{{links}}}}}", "control.law=asynchronous"]
-    trace = simulate(load(scenario, changes), "d")
+    given, links = load(scenario), {"delay_s": delay_s, "loss": loss}
+    changes: dict[str, Any] = {"channel": {**links, "seed": seed}}
+    if between == "ugvs":  # no theorem is about (b) and (c) then
+        given = replace(given, runs={"d": given.runs["d"]})
+        changes = {"channel": {"seed": seed, "ugvs": links}, "control.law": "asynchronous"}
+    trace = simulate(validated(given, changes), "d")
     arrived = [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs]
     sent = trace.messages.drop_duplicates(["kind", "number", "attempt"])
     return {
