@@ -8,19 +8,22 @@ it: what was judged otherwise than `holds`, and UGVs that did not arrive though 
 
     python benchmarks/channel.py --scenarios swap crossing doorway lab --delays 0 --losses 0 --ugvs 0 0.1 0.5 --seeds 3
     python benchmarks/channel.py --scenarios map{0..29} --delays 0 1 --losses 0 0.5
+
+With `--asynchronous` positions between UGVs are late and lost, under that law, in place of messages from and to UAVs.
 """
 
 import argparse
 import json
 from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import maps
 
-from airground_drake.scenario.load import from_data, load
+from airground_drake.scenario.load import from_data, load, validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.simulation import simulate
 from airground_drake.verify import judge
@@ -31,18 +34,27 @@ MAP, TEAM = "map", 4
 KEYS = ("scenario", "delay_s", "loss", "ugvs_loss", "seed")
 
 
-def over(scenario: str, channel: dict[str, Any]) -> Scenario:
-    """A shipped scenario or a random map, with a channel."""
-    if not scenario.removeprefix(MAP).isdecimal():
-        return load(scenario, [f"channel={json.dumps(channel)}"])
-    course = maps.draw(int(scenario.removeprefix(MAP)), TEAM)
-    return from_data(maps.scenario_of(course, [{"name": "coordinate"}]) | {"channel": channel}, course.name)
+def over(scenario: str, **changes: Any) -> Scenario:
+    """Run d of a shipped scenario or of a random map, with a channel."""
+    if scenario.removeprefix(MAP).isdecimal():
+        course = maps.draw(int(scenario.removeprefix(MAP)), TEAM)
+        given = from_data(maps.scenario_of(course, [{"name": "coordinate"}]), course.name)
+    else:
+        given = load(scenario)
+    return validated(replace(given, runs={"d": given.runs["d"]}), changes)
 
 
-def run(scenario: str, delay_s: float, loss: float, ugvs_loss: float = 0.0, seed: int = 1) -> dict[str, Any]:
+def run(
+    scenario: str, delay_s: float, loss: float, ugvs_loss: float = 0.0, seed: int = 1, *, asynchronous: bool = False
+) -> dict[str, Any]:
     """One run, in numbers."""
-    channel = {"delay_s": delay_s, "loss": loss, "seed": seed}
-    trace = simulate(over(scenario, channel | ({"ugvs": {"loss": ugvs_loss}} if ugvs_loss else {})), "d")
+    links = {"delay_s": delay_s, "loss": loss}
+    changes: dict[str, Any] = {"channel": links | {"seed": seed}}
+    if ugvs_loss:
+        changes["channel"]["ugvs"] = {"loss": ugvs_loss}
+    if asynchronous:
+        changes = {"channel": {"seed": seed, "ugvs": links}, "control.law": "asynchronous"}
+    trace = simulate(over(scenario, **changes), "d")
     arrived = {
         event["robot"]: event["t_s"]
         for event in trace.events if event["kind"] == "arrival" and event["robot"] in trace.ugvs
@@ -99,6 +111,7 @@ def main() -> None:
     parser.add_argument("--delays", nargs="+", type=float, default=[0.0, 0.1, 0.3, 1.0])
     parser.add_argument("--losses", nargs="+", type=float, default=[0.0, 0.1, 0.5])
     parser.add_argument("--ugvs", nargs="+", type=float, default=[0.0], help="losses of positions between UGVs")
+    parser.add_argument("--asynchronous", action="store_true", help="positions between UGVs, under that law")
     parser.add_argument("--seeds", type=int, default=1, help="of the channel: 1 up to this")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("-o", "--output", type=Path, default=Path("channel.jsonl"))
@@ -107,7 +120,8 @@ def main() -> None:
     made = {tuple(row[key] for key in KEYS) for row in rows}
     wanted = product(given.scenarios, given.delays, given.losses, given.ugvs, range(1, given.seeds + 1))
     with ProcessPoolExecutor(given.jobs) as pool, given.output.open("a", encoding="utf-8") as file:
-        for future in as_completed([pool.submit(run, *each) for each in wanted if each not in made and _counts(*each)]):
+        left = [keys for keys in wanted if keys not in made and _counts(*keys)]
+        for future in as_completed([pool.submit(run, *keys, asynchronous=given.asynchronous) for keys in left]):
             rows.append(future.result())
             print(json.dumps(rows[-1]), file=file, flush=True)
     order = [*dict.fromkeys([*SCENARIOS, *(row["scenario"] for row in rows)])]

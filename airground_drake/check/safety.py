@@ -253,6 +253,9 @@ def safe_hyp(run: Run) -> Found:
         for pair in run.pairs:
             law = pair.in_the_law
             near = law.safe_m + pair.cover_m + pair.closing_m_s * period + FAR_M
+            if pair.asynchronous:
+                lost = max(lost, _lost_to_old_positions_m(run, pair, period))
+                continue
             if run.apart_m[pair.robot, pair.other] > near:
                 continue
             rows = run.period_rows(pair.other)
@@ -272,6 +275,45 @@ def safe_hyp(run: Run) -> Found:
     except Disagreement as broken:
         return Found("refuted", because=broken)
     return Found("holds" if lost <= SMALL else "refuted", -lost if lost <= SMALL else None)
+
+
+def _lost_to_old_positions_m(run: Run, pair: Pair, period_s: float) -> float:
+    """What the steps of two UGVs miss in all of the law towards the last positions that each had of the other, m."""
+    # A step that misses nothing ends where the other's disc cannot come until that one decides again, or leads away
+    # from all of it, or is none. What is missed is missed for good. Pairs that stay far need no law.
+    ends = np.append(run.sample_row, len(run.t_s) - 1)
+    spans = np.diff(run.t_s[ends])
+    longest, lost, too_far = max(float(spans.max()), period_s), Fraction(), True
+    for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
+        heard_s, way = column_of(run.samples, f"{robot}.heard_{other}_s"), run.position_m[robot][ends]
+        k = np.searchsorted(run.sample_s, heard_s - SMALL).clip(0, len(heard_s) - 1)
+        sent = (np.abs(run.sample_s[k] - heard_s) <= SMALL) & (k <= np.arange(len(k)))
+        about = f"{robot}, {other}"
+        holds("position heard before", sent, heard_s, "a control sample so far", about=about, t_s=run.sample_s)
+        there, steps = run.position_m[other][ends], np.diff(way, axis=0)
+        speed = max(float((_lengths(np.diff(there, axis=0)) / spans).max()), float(run.robots[other]["max_speed_m_s"]))
+        steps[-1] *= max(1.0, period_s / float(spans[-1])) if abs(spans[-1] - period_s) > SMALL else 1.0
+        age = run.t_s[ends[:-1]] - run.t_s[ends[:-1]][k]
+        radius, apart = speed * (age + longest), way[:-1] - there[:-1][k]
+        too_far &= run.apart_m[pair.robot, pair.other] > pair.safe_m + float(radius.max()) + 2.0 * speed * longest
+        after = _lengths(apart) + (apart * steps).sum(axis=1) / np.maximum(_lengths(apart), FAR_M)
+        doubtful = ~((_lengths(apart) > radius + pair.safe_m + FAR_M) & (after > radius + pair.safe_m + FAR_M))
+        for i in np.flatnonzero(doubtful & steps.any(axis=1)).tolist():
+            lost += _missed_towards_old_m(apart[i], steps[i], Fraction(float(radius[i])), Fraction(pair.safe_m))
+    return 0.0 if too_far else float(lost)
+
+
+def _missed_towards_old_m(apart: Array, step: Array, radius: Fraction, safe: Fraction) -> Fraction:
+    """What one step misses, m: of the way that it may go towards a disc, or of the cone that leads off it."""
+    away, gone = ([Fraction(axis) for axis in vector.tolist()] for vector in (apart, step))
+    inner = sum((a * b for a, b in zip(away, gone, strict=True)), Fraction())
+    square = sum((a * a for a in away), Fraction())
+    turning = _root(sum((b * b for b in gone), Fraction()))[1] * radius - inner
+    least = 2 * max(turning, Fraction()) / safe  # half of the distance is kept in any case
+    low, high = _root(square)
+    if low >= safe + radius:
+        least = min(least, max(safe + radius - min((square + inner) / low, (square + inner) / high), Fraction()))
+    return least
 
 
 def _constants(run: Run) -> None:

@@ -37,6 +37,7 @@ class Pair(NamedTuple):
     drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
     slip_m: float = 0.0  # how much of its command the robot may miss in a period
     error_m: float = 0.0  # how far the measured relative position may be off: then the law acts on that one
+    asynchronous: bool = False  # whether each of two UGVs acts on an old position of the other
     halved: bool = False  # whether one of two robots may stand, so that the pair meets the law with half the gain
     # For how long from the start on the bodies have to be clear by themselves, since commands given before lead them;
     # None where their steered points say enough.
@@ -179,15 +180,21 @@ def pairs_of(scenario: Json) -> list[Pair]:
     room = {name: taken(robot, scenario["control"]) for name, robot in robots.items()}
     with_plants = [_with_plants(pair, room) for pair in beside_obstacles + beside_robots]
     error_m = float((scenario.get("sensing") or {}).get("position_error_m", 0.0))
-    lossy = links_of(scenario)["loss"] > 0.0
+    old, lossy = is_asynchronous(scenario), links_of(scenario)["loss"] > 0.0
     seen = [pair._replace(halved=pair.share < 1.0 and (error_m > 0.0 or (lossy and pair.robot in scenario["ugvs"])))
             for pair in with_plants]  # fmt: skip
+    seen = [pair._replace(asynchronous=old and {pair.robot, pair.other} <= {*scenario["ugvs"]}) for pair in seen]
     return [_as_seen(pair, error_m) if error_m or pair.halved else pair for pair in seen]
 
 
+def is_asynchronous(scenario: Json) -> bool:
+    """Whether UGVs act on old positions of each other."""
+    return bool(scenario["control"].get("law", "shared") == "asynchronous")
+
+
 def links_of(scenario: Json) -> dict[str, float]:
-    """Delay, s, and loss of positions between UGVs."""
-    given = (scenario.get("channel") or {}).get("ugvs") or {}
+    """Delay, s, and loss of positions between UGVs that share inequalities."""
+    given = {} if is_asynchronous(scenario) else (scenario.get("channel") or {}).get("ugvs") or {}
     return {key: float(given.get(key, 0.0)) for key in ("delay_s", "loss")}
 
 

@@ -71,6 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for term in pair.terms:
             owner = f" of {term.of}" if term.of and len(group) == 1 else ""
             print(f"    {term.key}{owner}: {term.metres:.4f} m")
+        if pair.unsure_m:
+            near_m = pair.gap_m + pair.unsure_m
+            print(f"    old positions: nearer than {near_m:.3f} m only to part; farther while messages are lost")
         if pair.start:
             print(f"    promised only with {pair.start}")
     return 0
@@ -153,4 +156,5 @@ def _entry(group: Sequence[PairBudget]) -> dict[str, object]:
         "in_the_law_m": pair.gap_m,
         "terms": [{"key": term.key, "metres": term.metres} for term in pair.terms],
         **({"promised_only_with": pair.start} if pair.start else {}),
+        **({"old_positions_m": pair.unsure_m} if pair.unsure_m else {}),
     }

@@ -35,6 +35,8 @@ class PairBudget(NamedTuple):
     terms: tuple[Term, ...]  # what it takes beyond the promise and the radii, in the order of their addition
     start: str = ""  # what the promise asks for where the obstacle appears later than at the start; '' if nothing
     least_gain: float = 0.0  # least A h with which errors of measured positions cost no more than that
+    # What one of two UGVs that act on old positions reckons with of the other's way, at least, m.
+    unsure_m: float = 0.0
 
     @property
     def gap_m(self) -> float:
@@ -85,7 +87,9 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
         law = float(law_distance(promised + radii, *both, gain=gain, passive=passive))
         start = _start(bounds[first], promised, law - radii) if kind == "obstacle" and appears.get(second) else ""
         least = least_gain(promised + radii, *both)
-        return PairBudget(first, second, kind, promised, radii, law, tuple(terms), start, least)
+        fastest = max(bounds[name].speed_m_s for name in (first, second)) if kind == "ugv" else 0.0
+        unsure = scenario.unsure_s * fastest
+        return PairBudget(first, second, kind, promised, radii, law, tuple(terms), start, least, unsure)
 
     appears = {name: obstacle.appears_s for name, obstacle in scenario.obstacles.items()}
     radius = {name: robot.radius_m for name, robot in scenario.robots.items()}
@@ -115,5 +119,6 @@ def alike(pairs: Iterable[PairBudget]) -> list[list[PairBudget]]:
     groups = dict[object, list[PairBudget]]()
     for pair in pairs:
         terms = tuple(sorted((term.key, term.metres) for term in pair.terms))
-        groups.setdefault((pair.kind, pair.promised_m, round(pair.gap_m, 12), terms, pair.start), []).append(pair)
+        same = pair.kind, pair.promised_m, round(pair.gap_m, 12), terms, pair.start, pair.unsure_m
+        groups.setdefault(same, []).append(pair)
     return [*groups.values()]

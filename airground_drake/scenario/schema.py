@@ -7,6 +7,7 @@ key without a default. Positions are in the world frame, z up, the ground at z =
 
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
 import json
+import math
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar
@@ -81,9 +82,10 @@ UNNAMED = "uav"
 SET = "set"
 """Source of a value that an override changed."""
 RULES: tuple[str, ...] = ("hysteresis", "first_stage")
+LAWS: tuple[str, ...] = ("shared", "asynchronous")
 OPTIONAL: dict[str, object] = {
     "channel": None, "sensing": None, "faults": None, "ugv_controller": None,
-    "uav": None, "uavs": {}, "ugvs": [], "lost_at_s": 0.0, "uav_m": 0.0,
+    "uav": None, "uavs": {}, "ugvs": [], "lost_at_s": 0.0, "uav_m": 0.0, "law": "shared",
 }  # fmt: skip
 """Keys that may be left out, and their values then: a scenario is written and digested as if these did not exist."""
 SETTABLE: tuple[str, ...] = ("channel", "decision", "gatekeeper", "intervention")
@@ -319,6 +321,10 @@ class Control:
     """Gain of tracking an intervention, (14)."""
     sensing_range_m: Positive = 4.0
     """Robots sense nothing beyond it; it covers every safe distance, both radii and a period of closing speed."""
+    law: Annotated[Words, one_of(LAWS)] = "shared"
+    """How two UGVs keep apart. 'shared': each does half, by positions of this sample. 'asynchronous', with
+    `channel.ugvs`: by positions of any age. A UGV keeps off all places where the other one can be until that one
+    decides again. So they need more room, V (age + period) besides the safe distance, unless they drive apart."""
 
 
 @dataclass(slots=True)
@@ -526,10 +532,14 @@ class UgvLinks:
     nothing. It stands in a period in which it lacks a message of another UGV, unless that one is surely far: the last
     position that it knows, less what the other may have driven since, is farther than the law asks for. Starts are
     known. Predictions of gatekeepers take all messages for received.
+
+    With `control.law: asynchronous` a UGV publishes where it is, and others act on the last position that they have,
+    however old that is. Predictions of gatekeepers know where the others are, and reckon with positions as old as the
+    delay makes them.
     """
 
     delay_s: NotNegative = 0.0
-    """How late a position is; at most the control period."""
+    """How late a position is; at most the control period, but for `control.law: asynchronous`."""
     loss: Loss = 0.0
     """Share of positions that are lost, by receiver."""
 
@@ -742,11 +752,32 @@ class Scenario:
     @property
     def announces(self) -> bool:
         """Whether UGVs publish where they will be at the next control sample."""
-        return self.ugv_links is not None and self.ugv_links.delay_s > 0.0
+        return self.ugv_links is not None and self.ugv_links.delay_s > 0.0 and not self.asynchronous
+
+    @property
+    def asynchronous(self) -> bool:
+        """Whether UGVs act on old positions of each other."""
+        return self.control.law == "asynchronous"
+
+    @property
+    def late_samples(self) -> int:
+        """After how many control samples a position arrives at the UGVs that act on old ones."""
+        late_s = self.ugv_links.delay_s if self.ugv_links and self.asynchronous else 0.0
+        return math.ceil(late_s / self.control.period_s * (1.0 - 1e-9))
+
+    @property
+    def unsure_s(self) -> float:
+        """How long UGVs reckon with any motion of others: the age of positions that all arrive, and a period; or 0."""
+        return (self.late_samples + 1) * self.control.period_s if self.asynchronous else 0.0
+
+    @property
+    def stands(self) -> bool:
+        """Whether robots stand where their inequalities contradict one another."""
+        return self.position_error_m > 0.0 or self.asynchronous
 
     def seen(self, robot: str) -> dict[str, Any]:
         """What the bounds of a robot's motion say about what is known: `error_m` and `may_stand`."""
-        lossy = self.ugv_links is not None and self.ugv_links.loss > 0.0
+        lossy = self.ugv_links is not None and self.ugv_links.loss > 0.0 and not self.asynchronous
         return {"error_m": self.position_error_m, "may_stand": lossy and robot in self.ugvs}
 
     @property

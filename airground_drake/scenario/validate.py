@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
-from itertools import pairwise, starmap
+from itertools import combinations, pairwise, starmap
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.exact import decimal, is_multiple
-from airground_drake.base.registry import ARRIVAL, MODEL_CLAIMS, ROUTES, RUN_CLAIMS
+from airground_drake.base.registry import ARRIVAL, METHODS, MODEL_CLAIMS, ROUTES, RUN_CLAIMS
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.plants.plant import Setting
@@ -96,9 +96,37 @@ def _ugv_links(scenario: Scenario) -> Problems:
             if key.startswith("channel.ugvs"):
                 yield f"runs.{run}.set.{key}", value, "the same in all runs: distances rest on it"
     period_s = scenario.control.period_s
-    if decimal(link.delay_s) > decimal(period_s):
+    if decimal(link.delay_s) > decimal(period_s) and not scenario.asynchronous:
         told = f"at most control.period_s = {period_s:.9g} s: a robot publishes where it will be a period later"
-        yield "channel.ugvs.delay_s", link.delay_s, f"{told}; control.period_s = {link.delay_s:.9g} would do"
+        would = f"control.period_s = {link.delay_s:.9g} would do, or control.law = asynchronous"
+        yield "channel.ugvs.delay_s", link.delay_s, f"{told}; {would}"
+
+
+def _asynchronous(scenario: Scenario) -> Problems:
+    """Old positions are covered of discs that move as they are told, and are exact; nothing is above avoidance."""
+    if not scenario.asynchronous:
+        return
+    told = "with control.law: asynchronous"
+    if scenario.ugv_links is None:
+        yield "control.law", "asynchronous", "shared: UGVs know all positions at once; channel.ugvs: {} would do, too"
+    if scenario.sensing is not None:
+        yield "sensing", Fault(told), "left out: no theorem is about old positions with errors"
+    for run, spec in scenario.runs.items():
+        if METHODS[spec.method].intervention_on_top and METHODS[spec.method].intervenes:
+            yield f"runs.{run}.method", spec.method, f"a or d {told}: {spec.method} puts interventions above avoidance"
+        if spec.composition != "augmented":
+            yield f"runs.{run}.composition", spec.composition, f"augmented {told}: UGVs stand where it asks for it"
+    for name, ugv in scenario.ugvs.items():
+        plant = plant_of(ugv, scenario.control.period_s)
+        if plant.signals or plant.measured:
+            why = f"first_order {told}: no theorem is about old positions of other plants"
+            yield f"ugvs.{name}.plant", Fault(ugv.plant[0].kind), why
+    for (one, first), (other, second) in combinations(scenario.ugvs.items(), 2):
+        keeps = scenario.unsure_s * max(first.max_speed_m_s, second.max_speed_m_s) + scenario.safe_distance.ugv_m
+        gap = math.dist(first.target_m, second.target_m) - first.radius_m - second.radius_m
+        if gap < keeps - TOLERANCE:
+            why = f"at least {keeps:.9g} m from that of {one}, not {gap:.9g} m"
+            yield f"ugvs.{other}.target_m", second.target_m, f"{why}: UGVs with positions so old come no nearer"
 
 
 def _names(scenario: Scenario) -> Problems:
@@ -647,5 +675,5 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
     _uavs, _names, _reserved, _charges, _ugv_links, _shapes, _map, _blocks, _route, _runs, _plants,
     _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _standing, _faults,
-    _measured, _budget, _reproduction, _choices,
+    _measured, _budget, _asynchronous, _reproduction, _choices,
 )  # fmt: skip

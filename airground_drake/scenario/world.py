@@ -26,7 +26,7 @@ def make_world(scenario: Scenario) -> World:
         frozenset(("ugv", "uav")): safe.air_ground_m,
         frozenset(("uav",)): safe.uav_m,
     }
-    return World((*robots, *obstacles), apart, control.avoidance_gain_1_s)
+    return World((*robots, *obstacles), apart, control.avoidance_gain_1_s, scenario.unsure_s)
 
 
 def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:

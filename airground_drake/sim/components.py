@@ -42,7 +42,7 @@ ANSWERING_S = 0.15  # time that an answer may take besides its way, s
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
     control = scenario.control
-    stands = scenario.position_error_m > 0.0
+    stands = scenario.stands
     return Avoidance(control.avoidance_gain_1_s, control.period_s, control.sensing_range_m, composition, stands)
 
 
@@ -132,6 +132,7 @@ def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
     for pair in pairs:
         if pair.kind == "ugv":
             between = max(between, pair.gap_m - pair.promised_m - (more[pair.first] + more[pair.second]))
+    between += scenario.unsure_s * max(ugv.max_speed_m_s for ugv in scenario.ugvs.values())  # see `Neighbours.share`
     radius = np.array([ugv.radius_m + more[name] for name, ugv in scenario.ugvs.items()])
     return radius, scenario.safe_distance.ugv_m + between
 

@@ -31,8 +31,8 @@ chose, which is held until the next sample.
     <ugv>.executing                           number of the proposal executed from this sample on, -1 without one
     <robot>.seen_x_m .seen_y_m .seen_z_m      only with `sensing` or `channel.ugvs.delay_s`: its published position,
                                               which robots act on
-    <ugv>.heard_<other>_s                     only with `channel.ugvs.loss`: the sample at which another UGV published
-                                              the last position that this one has of it
+    <ugv>.heard_<other>_s                     only with `channel.ugvs.loss` or `control.law: asynchronous`: the sample
+                                              at which another UGV published the last position that this one has of it
     <ugv>.uav_saw_x_m .uav_saw_y_m .uav_saw_z_m  only with `sensing`: where the UAV saw it, to plan with
     <ugv>.command_share                       only with unicycles: the share that was left of the law's command
     <robot>.drift_m_s .cover_m                only of users' plants, in the period that begins here: by how much

@@ -17,6 +17,7 @@ from airground_drake.scenario.schema import Scenario
 KINDS = {"air_ground": "uav_ugv", "ugv": "ugv_ugv", "uav": "uav_uav"}  # by `Scenario.pair_of`, of two robots
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), **dict.fromkeys(KINDS.values(), (Fraction(1, 2),) * 2)}
 MOVING = "moving"  # the kind of a robot beside an obstacle that may move: no theorem keeps its distance
+ASYNCHRONOUS = "asynchronous"  # the kind of two UGVs of which each acts on an old position of the other one
 # The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points.
 STEERED = "steered"
 
@@ -31,7 +32,12 @@ def kind_of(scenario: Scenario, first: str, second: str) -> str:
         return STEERED
     if len(robots) < 2:
         return "obstacle"
-    return KINDS[scenario.pair_of(first, second)]
+    return _of_robots(scenario, first, second)
+
+
+def _of_robots(scenario: Scenario, first: str, second: str) -> str:
+    pair = scenario.pair_of(first, second)
+    return ASYNCHRONOUS if pair == "ugv" and scenario.asynchronous else KINDS[pair]
 
 
 class Apart(NamedTuple):
@@ -39,7 +45,7 @@ class Apart(NamedTuple):
 
     first: str  # the robot
     second: str
-    kind: str  # one in `SHARES`, or `MOVING`
+    kind: str  # one in `SHARES`, `MOVING` or `ASYNCHRONOUS`
     required_m: float  # gap to keep between the surfaces
     radii_m: tuple[float, float]  # of the two bodies
 
@@ -55,7 +61,7 @@ def apart(scenario: Scenario) -> Iterator[Apart]:
     for name, other in combinations(robots, 2):
         pair = scenario.pair_of(name, other)
         radii = robots[name].radius_m, robots[other].radius_m
-        yield Apart(name, other, KINDS[pair], getattr(safe, f"{pair}_m"), radii)
+        yield Apart(name, other, _of_robots(scenario, name, other), getattr(safe, f"{pair}_m"), radii)
 
 
 class PairKind(NamedTuple):

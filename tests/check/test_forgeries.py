@@ -69,6 +69,7 @@ def test_every_rule_of_the_checker_has_a_forgery() -> None:
     said |= {"safe start of the bodies", "never backwards", "least turning radius"}  # and these
     said |= {"error of the measured position", "gain for errors"}  # and these
     said |= {"announced position", "standing without a message"}  # and these `test_positions`
+    said |= {"position heard before"}  # and this `test_old_positions`
     said |= {f"{what} of a plant" for what in ("drift", "cover")}  # and these `test_own_plants`
     for path in Path(check.__file__).parent.glob("*.py"):
         for call in (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)):

@@ -18,6 +18,7 @@ from airground_drake.verify.runs.pairs import Pair, cores_of, pairs_beside, pair
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected
+from oracles.positions import acts_on_old, late_samples
 from oracles.protocol import parts_of
 from oracles.sensing import moves, place_of, still_parts
 from oracles.turning import numbers_of
@@ -185,14 +186,19 @@ def _other(
 ) -> tuple[tuple[Array, Array], float, float, float]:
     """Where another robot is predicted to be, (S + 1, 3), m; its safe distance, its share, when its motion is over.
 
+    The share is below 0 where old positions count: minus how far off it may be then, m.
+
     The places come twice: if the proposal is refused, and if it is accepted. The other part of its joint plan counts in
     the second only.
     """
     other = pair.second if pair.first == robot else pair.first
     here, velocity = moves(trace, other, t)
     coasting = here + np.minimum(after, trace.scenario.gatekeeper.horizon_s)[:, None] * velocity
-    asked = told.get(other)
+    asked, share = told.get(other), pair.share
+    if acts_on_old(trace) and other in trace.ugvs:
+        since = (late_samples(trace) + 1) * trace.scenario.control.period_s
+        share = -trace.scenario.ugvs[other].max_speed_m_s * since
     if asked is None:
-        return (coasting, coasting), pair.law_m, pair.share, -np.inf
+        return (coasting, coasting), pair.law_m, share, -np.inf
     goes = place(asked, t + after) + np.exp(-after)[:, None] * (here - place(asked, t))
-    return (coasting, goes), pair.law_m, pair.share, float(asked.times_s[-1])
+    return (coasting, goes), pair.law_m, share, float(asked.times_s[-1])

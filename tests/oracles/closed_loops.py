@@ -11,6 +11,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import Cores, away_from
 from airground_drake.verify.runs.control_law import PLANE, least_speeds, retreats
 from oracles.control_law import Asked, Inequalities, commanded, tracking
+from oracles.positions import towards_old
 from oracles.turning import able, edges
 from oracles.turning import rates as rates_of
 
@@ -44,7 +45,7 @@ class Scene(NamedTuple):
         movers: cores of L parts of obstacles that move, about their origins, (L,).
         origins: at the control samples, (S + 1, L, 3), m.
         safe: distances to keep from all of these, (M + K + L,), m.
-        share: of the inequalities, (M + K + L,).
+        share: of the inequalities, (M + K + L,); below 0 see `towards_old`: minus `unsure`.
         speed: expected of them at most, (M + K + L,), m/s; 0: the passive law does not apply.
         heading: of a unicycle or car, (), rad.
         numbers: of a unicycle or car, (5,), see `turning`.
@@ -135,6 +136,9 @@ def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterato
         bound = least_speeds(distance, scenes.safe, scenes.share, control, scenes.speed)
         retreat = retreats(distance, scenes.safe, scenes.speed, h)
         given = Inequalities(normal * PLANE, bound, retreat if retreat.any() else None)
+        if (old := scenes.share < 0.0).any():
+            given = given._replace(bound=np.where(old, -np.inf, bound))
+            given = given.also(*towards_old(normal, distance, scenes.safe, np.where(old, -scenes.share, 0.0), h))
         given = given.also(*edges(heading, scenes.numbers))
         own = tracking(place, scenes.preset[:, k], rates[:, k], control.motion_gain_1_s, scenes.limit)
         rows = np.flatnonzero(scenes.executed[:, k])

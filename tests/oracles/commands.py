@@ -25,7 +25,7 @@ from oracles.control_law import (
     tracking,
 )
 from oracles.fault import Fault
-from oracles.positions import stands
+from oracles.positions import acts_on_old, stands
 from oracles.protocol import executed_at
 from oracles.turning import able, edges, numbers_of
 
@@ -115,6 +115,6 @@ def _law_of_uav(trace: Trace, name: str, samples: Rows) -> Law:
     over = centroid + np.array([0.0, 0.0, uav.altitude_m])
     below = limited(fed + control.formation_gain_1_s * (over - position), uav.max_speed_m_s)
     given, limit = as_seen(trace, name), uav.max_speed_m_s
-    composition = "standing" if trace.scenario.position_error_m else "augmented"
+    composition = "standing" if trace.scenario.position_error_m or acts_on_old(trace) else "augmented"
     command = avoiding(retreating(below, given, limit, planar=False), given, composition, planar=False, limit=limit)
     return Law(command, np.linalg.norm(recorded - command, axis=1))

@@ -16,7 +16,7 @@ from airground_drake.verify.runs.control_law import ON_TOP, PLANE, inequalities_
 from airground_drake.verify.runs.control_law import Inequalities as OfRun
 from airground_drake.verify.runs.pairs import parts_of
 from airground_drake.verify.runs.proposals import ProposalRecord
-from oracles.positions import unheard
+from oracles.positions import acts_on_old, old_positions, unheard
 from oracles.projection import CONTRADICTION_M_S, closest, least_violation, shortened
 
 MARGIN_M_S = 1e-12
@@ -49,18 +49,20 @@ class Inequalities(NamedTuple):
 
 def as_seen(trace: Trace, robot: str) -> Inequalities:
     """The inequalities of what a robot saw at the control samples, side by side in the order of its controller."""
-    given, count = _heard(trace, robot), len(trace.sample_rows)
+    given, count = _current(trace, robot), len(trace.sample_rows)
     k = np.arange(len(given.sample)) - np.searchsorted(given.sample, given.sample)
     most = int(k.max(initial=-1)) + 1
     normal, bound, retreat = np.zeros((count, most, 3)), np.full((count, most), -np.inf), np.zeros((count, most))
     normal[given.sample, k], bound[given.sample, k], retreat[given.sample, k] = given.normal, given.bound, given.retreat
-    return Inequalities(normal, bound, retreat if retreat.any() else None)
+    return Inequalities(normal, bound, retreat if retreat.any() else None).also(*old_positions(trace, robot))
 
 
-def _heard(trace: Trace, robot: str) -> OfRun:
-    """The inequalities of a robot, without those beside robots whose messages it lacks."""
+def _current(trace: Trace, robot: str) -> OfRun:
+    """The inequalities of a robot, but for those beside robots whose messages it lacks, or has old ones of."""
     given, parts = inequalities_of(trace, robot, as_seen=True), len(parts_of(trace).owner)
     lacks = np.pad(unheard(trace, robot), ((0, 0), (parts, 0)))[given.sample, given.column]
+    if acts_on_old(trace) and robot in trace.ugvs:
+        lacks |= (given.column >= parts) & (given.column < parts + len(trace.ugvs))
     return OfRun(*(array[~lacks] for array in given))
 
 
@@ -158,8 +160,9 @@ def intervened(position: Array, below: Array, asked: Asked, gain: float, limit: 
 
 
 def composed(trace: Trace) -> str:
-    """How the avoidance tasks of a run are composed; with errors of positions robots stand in contradictions."""
-    return "standing" if trace.scenario.position_error_m else str(trace.meta["composition"])
+    """How the avoidance tasks of a run are composed; with errors or old positions robots stand in contradictions."""
+    stand = trace.scenario.position_error_m or acts_on_old(trace)
+    return "standing" if stand else str(trace.meta["composition"])
 
 
 def commanded(

@@ -20,7 +20,51 @@ Flags = npt.NDArray[np.bool_]
 def loses(trace: Trace) -> bool:
     """Whether positions may be lost between the UGVs of a run."""
     links = trace.scenario.ugv_links
-    return links is not None and links.loss > 0.0
+    return links is not None and links.loss > 0.0 and not acts_on_old(trace)
+
+
+def acts_on_old(trace: Trace) -> bool:
+    """Whether UGVs act on the last positions of each other that arrived, by the asynchronous law."""
+    return trace.scenario.control.law == "asynchronous"
+
+
+def late_samples(trace: Trace) -> int:
+    """After how many control samples a position arrives there."""
+    links = trace.scenario.ugv_links
+    return int(np.ceil(links.delay_s / trace.scenario.control.period_s - 1e-9)) if links and acts_on_old(trace) else 0
+
+
+def towards_old(normal: Array, distance: Array, safe: Array, unsure: Array, period_s: float) -> tuple[Array, Array]:
+    """The asynchronous law: normals (B, 2 K, 3) and bounds (B, 2 K), m/s, towards K places of others that were once.
+
+    Each was `distance` away, (B, K), m; the other one is within `unsure`, (B, K), m, of it until it decides again, 0
+    where the law is another one.
+    """
+    excess = distance - safe - unsure
+    angle = np.where(excess < 0.0, np.arccos(np.minimum(unsure / np.maximum(distance, 1e-300), 1.0)), 0.5 * np.pi)
+    bound = np.where(excess < 0.0, 0.0, -excess / period_s)
+    across = np.stack([-normal[..., 1], normal[..., 0], np.zeros_like(distance)], axis=-1)
+    sides = [np.sin(angle)[..., None] * normal + side * np.cos(angle)[..., None] * across for side in (1.0, -1.0)]
+    stuck = (excess < 0.0) & (distance <= unsure)
+    for side, turned in zip((1.0, -1.0), sides, strict=True):
+        turned[stuck] = [side, 0.0, 0.0]
+    bound = np.where(unsure > 0.0, np.where(stuck, 1.0, bound), -np.inf)
+    return np.concatenate(sides, axis=1), np.concatenate([bound, bound], axis=1)
+
+
+def old_positions(trace: Trace, ugv: str) -> tuple[Array, Array]:
+    """`towards_old` of what a UGV had heard at the control samples, (S, 2 K, 3) and (S, 2 K)."""
+    others = [other for other in trace.ugvs if other != ugv] if acts_on_old(trace) and ugv in trace.ugvs else []
+    here, t, h = trace.position(ugv)[trace.sample_rows], trace.sampled("t_s"), trace.scenario.control.period_s
+    away, unsure, safe = np.zeros((len(t), len(others), 3)), *np.zeros((2, len(t), len(others)))
+    for k, other in enumerate(others):
+        since = t - trace.sampled(f"{ugv}.heard_{other}_s")
+        sent = np.arange(len(t)) - np.rint(since / h).astype(np.intp)
+        away[:, k] = here - trace.position(other)[trace.sample_rows][sent]
+        unsure[:, k] = trace.scenario.ugvs[other].max_speed_m_s * (since + h)
+        safe[:, k] = pair_of(trace, ugv, other).law_m
+    apart = np.linalg.norm(away, axis=2)
+    return towards_old(away / np.where(apart > 0.0, apart, 1.0)[..., None], apart, safe, unsure, h)
 
 
 def unheard(trace: Trace, ugv: str) -> Flags:
@@ -58,18 +102,19 @@ def wrong_positions(trace: Trace) -> list[Fault]:
 
 def _heard_otherwise(trace: Trace) -> Iterator[Fault]:
     links, channel, t = trace.scenario.ugv_links, trace.scenario.channel, trace.sampled("t_s")
-    if links is None or channel is None or not links.loss:
+    if links is None or channel is None or not (links.loss or acts_on_old(trace)):
         return
+    late, h = late_samples(trace), trace.scenario.control.period_s
     n, last = len(trace.ugvs), np.zeros((len(trace.ugvs),) * 2)
     for k, now in enumerate(t.tolist()):
-        lot = random.Random(f"{channel.seed}/ugvs/{k}")
+        lot = random.Random(f"{channel.seed}/ugvs/{k - late}")
         draws = [[lot.random() for _ in range(n)] for _ in range(n)]
         for i, ugv in enumerate(trace.ugvs):
             for j, other in enumerate(trace.ugvs):
                 if i == j:
                     continue
-                if k == 0 or draws[i][j] >= links.loss:
-                    last[i, j] = now
+                if k == late or (k > late and draws[i][j] >= links.loss):
+                    last[i, j] = now - late * h
                 recorded = trace.sampled(f"{ugv}.heard_{other}_s")[k]
                 if abs(recorded - last[i, j]) > TIME_TOLERANCE_S:
                     yield Fault("heard otherwise", ugv, now, {"of": other, "due": last[i, j], "recorded": recorded})

@@ -79,7 +79,8 @@ class Neighbours(NamedTuple):
         still: outlines of the parts at rest, (m, W).
         parts: outlines of all parts that move, about the origins of their bodies, (P, W).
         distance: distances that the law keeps between the robot's steered point and the cores, (k, m + n), m.
-        share: part of the avoidance inequality that the robot takes, (k, m + n).
+        share: part of the avoidance inequality that the robot takes, (k, m + n). Below 0 the law is the asynchronous
+            one, and it is minus how far the other one may be from its old position until it decides again, m.
         mobility: of the robots, (k, 3), 1 where they can move, else 0.
         max_speed: of the robots, (k,), m/s.
     """
@@ -123,11 +124,13 @@ class World:
             say what distance to keep from it. Each of two robots takes half of an inequality, a robot beside an
             obstacle all of it.
         gain_1_s: gain A of the law, which makes up for drift: see `model.plants.budget`.
+        unsure_s: how long a UGV has to reckon with any motion of another one, s; 0: they share inequalities.
     """
 
     bodies: tuple[Body, ...]
     apart_m: Mapping[frozenset[Kind], float]
     gain_1_s: float = 0.0
+    unsure_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the order."""
@@ -245,12 +248,22 @@ class World:
             np.concatenate([self.keep(i, self.still), self._beside(robot, radius)[other]])
             for i, robot, radius, other in zip(members, robots, self.radius[members], others, strict=True)
         ]
-        share = np.where(np.array([body.kind in ROBOTS for body in self.moving]), 0.5, 1.0)[carrier]
+        share = np.array([
+            [self._share(robot, body) for body in (self.moving[j] for j in carrier[other])]
+            for robot, other in zip(robots, others, strict=True)
+        ]).reshape(others.shape)  # fmt: skip
         return Neighbours(
             members, carrier, others, self.still, parts, np.array(distance).reshape(len(members), -1),
-            np.array([np.append(np.ones(len(self.still)), share[other]) for other in others]).reshape(len(members), -1),
+            np.hstack([np.ones((len(members), len(self.still))), share]),
             _rows([robot.mobility for robot in robots]), np.array([robot.max_speed_m_s for robot in robots]),
         )  # fmt: skip
+
+    def _share(self, robot: Body, other: Body) -> float:
+        """The part of an inequality that a robot takes beside a body that moves; below 0 as in `Neighbours`."""
+        if other.kind not in ROBOTS:
+            return 1.0
+        unsure_m = self.unsure_s * other.max_speed_m_s if robot.kind == other.kind == "ugv" else 0.0
+        return -unsure_m or 0.5
 
     def keep(self, robot: int, rows: Array) -> Array:
         """Distances that the law keeps between a robot's steered point and the cores of obstacles (m, W): (m,), m."""

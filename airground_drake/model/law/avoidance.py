@@ -15,6 +15,12 @@ Beside an obstacle that may move at a speed V the robot does nothing that would 
     n.v >= -(D - d - V h) / h  if D >= d + V h: whatever the obstacle does, d is kept in this period;
     n.v >= 0                   otherwise: what is lost below min(D, d + V h), the obstacle has moved itself.
 
+Two UGVs that act on old positions of each other (`control.law: asynchronous`) share nothing. With rho the way that the
+other one can have gone from its old position until it decides again, D away,
+
+    n.v >= -(D - d - rho) / h  if D >= d + rho;
+    D n.v >= rho ||v||         otherwise: away from every place where it can be. In the plane these are two half-planes.
+
 Below these inequalities, and above all other tasks, it retreats: n.v >= V - (D - d) / h, as far as its speed limit
 allows. D and d are distances of the robot's centre from the *core* of
 what it avoids (`model.geometry.outline`): `World` puts both radii into d.

@@ -76,12 +76,13 @@ def fill_half_spaces(
         others: the n of these parts that the robot keeps away from, (n,).
         places: positions of the bodies that move, (M, 3), m.
         distance: safe distances from the cores, (m + n,), m.
-        share: shares of the inequalities, (m + n,).
+        share: shares of the inequalities, (m + n,); below 0 as in `Neighbours`.
         layer: the numbers of the layer.
-        which: result, (m + n,): the first K entries say what the constraints are about, counting what is at rest first.
-        normal: result, (m + n, 3); the first K rows.
-        bound: result, (m + n,), m/s; the first K entries.
-        retreat: result, (m + n,), m/s: speeds away that the robot should have, 0 where it need not retreat.
+        which: result, (m + 2 n,): the first K entries say what the constraints are about, counting what is at rest
+            first.
+        normal: result, (m + 2 n, 3); the first K rows.
+        bound: result, (m + 2 n,), m/s; the first K entries.
+        retreat: result, (m + 2 n,), m/s: speeds away that the robot should have, 0 where it need not retreat.
     """
     gain, period, reach, planar = layer.gain, layer.period, layer.sensing_range, mobility[2] == 0.0
     x, y, z = position[0], position[1], position[2]
@@ -95,6 +96,10 @@ def fill_half_spaces(
             part = others[k - m]
             origin = carrier[part]
             px, py, pz = places[origin, 0], places[origin, 1], places[origin, 2]
+            if share[k] < 0.0:
+                which[count], which[count + 1] = k, k
+                count = _keep_off(x - px, y - py, distance[k], -share[k], period, normal, bound, retreat, count)
+                continue
             apart = nearest(parts[part], x - px, y - py, z - pz, planar, normal[count], reach)
         if apart > reach:
             continue
@@ -107,6 +112,31 @@ def fill_half_spaces(
             retreat[count] = max(speed - excess / period, 0.0)
         else:
             bound[count] = -share[k] * gain * excess if excess <= 0.0 else -share[k] * excess / period
+        count += 1
+    return count
+
+
+@njit(cache=True, inline="always")
+def _keep_off(
+    x: float, y: float, distance: float, unsure: float, period: float, normal: Array, bound: Array, retreat: Array,
+    count: int,
+) -> int:  # fmt: skip
+    """Add the constraints of a UGV that is at (x, y), m, as seen from an old position of another one."""
+    apart = np.sqrt(x * x + y * y)
+    if apart > unsure:
+        x, y = x / apart, y / apart
+    excess, sine, cosine = apart - distance - unsure, 1.0, 0.0
+    if excess < 0.0:  # a cone about the direction away, which is two half-planes; none if it has no inside
+        cosine = min(unsure / max(apart, 1e-300), 1.0)
+        sine = np.sqrt(1.0 - cosine * cosine)
+    for side in range(1 if excess >= 0.0 else 2):
+        turned = cosine if side == 0 else -cosine
+        normal[count, 0], normal[count, 1], normal[count, 2] = sine * x - turned * y, sine * y + turned * x, 0.0
+        retreat[count], bound[count] = 0.0, 0.0
+        if excess >= 0.0:
+            bound[count] = -excess / period
+        elif sine == 0.0:  # nobody meets both: who cannot tell which way leads away stands
+            normal[count, 0], normal[count, 1], bound[count] = 1.0 - 2.0 * side, 0.0, 1.0
         count += 1
     return count
 
@@ -200,8 +230,8 @@ def commands(lower: Array, positions: Array, near: Neighbours, layer: Layer) -> 
     # Reading an array of a named tuple within the loop would count references.
     members, carrier, others, still, parts, distance, share, mobility, max_speed = near
     velocity = limit_speed(lower, max_speed)
-    normal, bound = np.empty((distance.shape[1], 3)), np.empty(distance.shape[1])
-    which, retreat = np.empty(distance.shape[1], np.intp), np.empty(distance.shape[1])
+    most = distance.shape[1] + others.shape[1]
+    normal, bound, which, retreat = np.empty((most, 3)), np.empty(most), np.empty(most, np.intp), np.empty(most)
     for i in range(len(velocity)):
         count = fill_half_spaces(
             positions[members[i]], mobility[i], still, parts, carrier, others[i], positions, distance[i], share[i],

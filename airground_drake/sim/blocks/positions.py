@@ -1,7 +1,8 @@
 """Positions between UGVs over links that are late and lose messages: what is announced, what is heard, who stands.
 
-A robot publishes at a control sample where it will be at the next one: then messages have a period to arrive. Without
-this sample's message of another UGV a UGV stands, unless that one is surely far; then it leaves it out of its law.
+Under the shared law a robot publishes at a control sample where it will be at the next one: then messages have a period
+to arrive. Without this sample's message of another UGV a UGV stands, unless that one is surely far; then it leaves it
+out of its law. Under the asynchronous law it publishes where it is, and others act on the last position that they have.
 """
 
 import random
@@ -10,10 +11,9 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, System
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import Neighbours, World
 from airground_drake.model.law.ugv_law import UgvLaw
@@ -28,7 +28,7 @@ OF_ROBOTS = ("members", "others", "distance", "share", "mobility", "max_speed")
 
 
 @lru_cache(maxsize=4)
-def lost(seed: int, loss: float, count: int, sample: int) -> npt.NDArray[np.bool_]:
+def lost(seed: int, loss: float, count: int, sample: int) -> Flags:
     """Which messages of a control sample are lost, (count, count), by receiver and sender: nothing else counts."""
     lot = random.Random(f"{seed}/ugvs/{sample}")
     drawn = np.array([lot.random() for _ in range(count * count)]).reshape(count, count)
@@ -77,17 +77,19 @@ class Hearing(LeafSystem):
         in  `bodies` (3M) m: what is published.
         out `heard_s` (n n), by receiver and sender: the control sample, s, of the last position that arrived;
             `last_places` (3 n n) m, that position.
-    State: discrete, the same.
+    State: discrete, the same, and the positions (3n) of the last `late` samples, which are on their way.
     Rate: one update per control period, from t = 0.
     """
 
-    def __init__(self, world: World, seed: int, loss: float, period: float) -> None:
+    def __init__(self, world: World, seed: int, loss: float, period: float, late: int = 0) -> None:
         super().__init__()
         self._ugvs, self._seed, self._loss, self._period = world.select("ugv"), seed, loss, period
+        self._late = late
         self._bodies = declare_bodies(self, world)
         n = len(world.names("ugv"))
         self.DeclareDiscreteState(np.zeros(n * n))
         self.DeclareDiscreteState(np.tile(world.starts[self._ugvs], (n, 1)).ravel())
+        self.DeclareDiscreteState(np.tile(world.starts[self._ugvs], (late, 1)).ravel())
         self.DeclareVectorOutputPort("heard_s", n * n, weakly(self._calc_heard))
         self.DeclareVectorOutputPort("last_places", 3 * n * n, weakly(self._calc_places))
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, weakly(self._update))
@@ -98,10 +100,12 @@ class Hearing(LeafSystem):
         n, t = len(published), context.get_time()
         heard, places = (context.get_discrete_state(k).value().copy() for k in (0, 1))
         heard, places, sample = heard.reshape(n, n), places.reshape(n, n, 3), round(t / self._period)
-        if abs(t - sample * self._period) <= SAME_S:
-            arrived = ~lost(self._seed, self._loss, n, sample)
-            heard[arrived] = t
-            places[arrived] = np.broadcast_to(published, (n, n, 3))[arrived]
+        if abs(t - sample * self._period) <= SAME_S and sample >= self._late:
+            arrived, own = ~lost(self._seed, self._loss, n, sample - self._late), np.eye(n, dtype=np.bool_)
+            sent = context.get_discrete_state(2).value()[: 3 * n].reshape(n, 3) if self._late else published
+            heard[arrived] = t - self._late * self._period
+            places[arrived] = np.broadcast_to(sent, (n, n, 3))[arrived]
+            heard[own], places[own] = t, published
         return heard, places
 
     def _calc_heard(self, context: Context, output: BasicVector) -> None:
@@ -113,9 +117,13 @@ class Hearing(LeafSystem):
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         for k, now in enumerate(self._now(context)):
             discrete.set_value(k, now.ravel())
+        if self._late:
+            published = self._bodies.Eval(context).reshape(-1, 3)[self._ugvs]
+            under_way = context.get_discrete_state(2).value()[published.size :]
+            discrete.set_value(2, np.append(under_way, published))
 
 
-class WaryUgvController(UgvController):
+class HearingUgvController(UgvController):
     """A `UgvController` with the further input ports `heard_s` and `last_places`, see `Hearing`."""
 
     def __init__(self, world: World, law: UgvLaw) -> None:
@@ -123,6 +131,48 @@ class WaryUgvController(UgvController):
         n = len(world.names("ugv"))
         self._heard = self.DeclareVectorInputPort("heard_s", n * n)
         self._last_places = self.DeclareVectorInputPort("last_places", 3 * n * n)
+
+    def _alone(
+        self, i: int, known: Array, near: Neighbours, t: float, reference: Array, rate: Array,
+        accepted: Sequence[Proposal | None], headings: Array | None, law: UgvLaw,
+    ) -> Array:  # fmt: skip
+        """The command of UGV i, (3,), m/s, which knows bodies at (M, 3), m, by its row of all that is near."""
+        row = slice(i, i + 1)
+        near = near._replace(**{name: getattr(near, name)[row] for name in OF_ROBOTS})
+        steering, motion = self._world.steering, accepted[i]
+        steered = None if steering is None or headings is None else (headings[row], steering[row])
+        asked = [None if motion is None else asked_at(motion, t)]
+        velocity: Array = law.velocity(known, near, reference[row], rate[row], asked, steered)[0]
+        return velocity
+
+
+class AsynchronousUgvController(HearingUgvController):
+    """UGVs that act on the last positions of each other that arrived, each by the asynchronous law."""
+
+    def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
+        near, n = self._world.at(self._near, t), len(self._near.members)
+        heard = self._heard.Eval(context).reshape(n, n)
+        last = self._last_places.Eval(context).reshape(n, n, 3)
+        carried, velocity = near.carrier[near.others], np.empty((n, 3))
+        share, still = near.share.copy(), near.share.shape[1] - near.others.shape[1]
+        for i in range(n):
+            known = positions.copy()
+            known[near.members] = last[i]
+            known[near.members[i]] = positions[near.members[i]]
+            of_ugvs = np.flatnonzero(carried[i] < n)
+            senders = carried[i, of_ugvs]
+            unsure_s = t - heard[i, senders] + self.avoidance.period
+            share[i, still + of_ugvs] = -near.max_speed[senders] * unsure_s
+            velocity[i] = self._alone(i, known, near._replace(share=share), t, *about)
+        return velocity
+
+
+class WaryUgvController(HearingUgvController):
+    """UGVs that stand where they lack a message, or leave out whom they know to be far."""
+
+    def __init__(self, world: World, law: UgvLaw) -> None:
+        super().__init__(world, law)
+        n = len(world.names("ugv"))
         speed = np.array([body.max_speed_m_s for body in world.moving[:n]])
         error = np.array([body.bounds.error_m for body in world.moving[:n]])
         step = speed * law.avoidance.period + error
@@ -142,20 +192,11 @@ class WaryUgvController(UgvController):
             velocity[i] = self._without(i, unheard[i], t, positions, *about)
         return velocity
 
-    def _without(
-        self, i: int, left_out: npt.NDArray[np.bool_], t: float, positions: Array, reference: Array, rate: Array,
-        accepted: Sequence[Proposal | None], headings: Array | None, law: UgvLaw,
-    ) -> Array:  # fmt: skip
+    def _without(self, i: int, left_out: Flags, t: float, positions: Array, *about: Any) -> Array:
         """The command of UGV i, (3,), m/s, by the law as if some UGVs were beyond its sensing range."""
-        known, near = positions.copy(), self._world.at(self._near, t)
-        row = slice(i, i + 1)
-        known[near.members[left_out]] = known[near.members[i]] + [2.0 * law.avoidance.sensing_range, 0.0, 0.0]
-        near = near._replace(**{name: getattr(near, name)[row] for name in OF_ROBOTS})
-        steering, motion = self._world.steering, accepted[i]
-        steered = None if steering is None or headings is None else (headings[row], steering[row])
-        asked = [None if motion is None else asked_at(motion, t)]
-        velocity: Array = law.velocity(known, near, reference[row], rate[row], asked, steered)[0]
-        return velocity
+        known, members = positions.copy(), self._near.members
+        known[members[left_out]] = known[members[i]] + [2.0 * self.avoidance.sensing_range, 0.0, 0.0]
+        return self._alone(i, known, self._world.at(self._near, t), t, *about)
 
 
 def _distances(near: Neighbours, n: int) -> Array:
@@ -180,6 +221,10 @@ class Between(NamedTuple):
 
 def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
     """Positions as they are or as they are measured, and over the links between UGVs if there are any."""
+    if scenario.asynchronous and scenario.channel and scenario.ugv_links:
+        seed, loss = scenario.channel.seed, scenario.ugv_links.loss
+        hearing = Hearing(world, seed, loss, scenario.control.period_s, scenario.late_samples)
+        return Between(AsynchronousUgvController(world, law), {"hearing": hearing}, {}, "bodies")
     published, link, period = (
         "published" if scenario.sensing else "bodies",
         scenario.ugv_links,
@@ -187,7 +232,7 @@ def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
     )
     parts, renamed = dict[str, LeafSystem](), dict[System, Mapping[str, str]]()
     seen = "seen_by_uav" if scenario.sensing else "bodies"
-    if link and link.delay_s:
+    if scenario.announces:
         late, seed = (scenario.faults or Faults()).late, scenario.channel.seed if scenario.channel else 1
         parts["announcements"] = Announcements(world, period, late, seed)
         renamed[parts["announcements"]], published = {"bodies": published}, "announced"

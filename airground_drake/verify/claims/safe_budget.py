@@ -14,11 +14,13 @@ from airground_drake.verify.claims.safe_inv import stable
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
+OLD = "distance promised to UGVs that act on old positions"
 ROUNDED_M = 1e-12  # by so much rounding may make a distance of the law too small, m
 BASIC = ("Budget.at_samples", "Budget.budget_always")
 # Those about a robot beside an obstacle that may move; a plant adds its own.
 OF_STANDING = ("Budget.one_stands", "Budget.smaller_gain", "Mixed.entry_keeps")
 OF_ERRORS = ("Budget.measured_start", *OF_STANDING)
+OF_OLD = ("Async.towards_old", "Async.old_positions")
 BESIDE_MOVING = ("Passive.own_doing", "Passive.kept")
 
 
@@ -31,10 +33,11 @@ class SafeBudget(TheoremClaim):
         "bodies start at the safe distance d. Then the bodies keep d at all times: those of robots that turn, lag, "
         "get their commands late or have a plant of the user's own, of robots that act on measured positions with "
         "bounded errors, and of UGVs that stand where they lack another one's message. With measured positions, each "
-        "pair meets its inequality as measured, or both stand. When an obstacle appears, a body that lags or gets its "
-        "commands late must be clear of it, and so must its way under commands already given (SAFE-HYP). Beside an "
-        "obstacle that may move, the bodies keep what SAFE-OWN states. For each kind of pair d_law is at least what "
-        "the theorems ask for."
+        "pair meets its inequality as measured, or both stand. UGVs that act on old positions of each other, of any "
+        "age, keep d if each keeps off where the other can be until that one decides again. When an obstacle appears, "
+        "a body that lags or gets its commands late must be clear of it, and so must its way under commands already "
+        "given (SAFE-HYP). Beside an obstacle that may move, the bodies keep what SAFE-OWN states. For each kind of "
+        "pair d_law is at least what the theorems ask for."
     )
     latex = (
         r"d_{\mathrm{law}} \ge b + \sum_{i} (c_i + f_i + w_i / A), \quad b = d + V |\delta_i - \delta_j| \text{ or } "
@@ -45,6 +48,8 @@ class SafeBudget(TheoremClaim):
         r"e \text{ (errors of measured positions)}: \; d_{\mathrm{law}} \ge e + \sqrt{m^2 + e^2} + \sum_i w_i / A', "
         r"\quad m = b + \sum_i (c_i + f_i), \quad e (1 - A' h) \le A' h \sqrt{m^2 + e^2}, \quad A' = A / 2 "
         r"\text{ (two robots)}",
+        r"n^\top u \ge -(D - d - \rho)/h \text{ where } D \ge d + \rho, \text{ else } D \, n^\top u \ge \rho "
+        r"\lVert u \rVert, \quad \rho = V (\text{age} + h) \text{ (old positions)}",
     )
     method = (
         "Theorems in Coq about each kind of plant. Their hypotheses on the numbers of the scenario are checked here; "
@@ -58,13 +63,15 @@ class SafeBudget(TheoremClaim):
         "Commands stay within the speed limits (SAFE-HYP checks the run).",
         "Measured positions are no farther off than declared, and all robots act on the same ones (SAFE-HYP checks "
         "both in the run).",
+        "UGVs that act on old positions of each other are discs that move as they are told (others are refused), and "
+        "start d apart; positions were exact, and h is the period of both (SAFE-HYP checks each step against them).",
         "A delay comes before a lag. Between a robot with either and a unicycle, what both cost is added up.",
     )
     does_not_establish = (
         "That the steered points keep the law's distance (SAFE-INV does), or that a command was met in full: a "
         "shortened command recovers a distance at a smaller gain."
     )
-    theorems: tuple[str, ...] = (*BASIC, *OF_ERRORS, *BESIDE_MOVING, "Plants", "Turning", "Mixed")
+    theorems: tuple[str, ...] = (*BASIC, *OF_ERRORS, *OF_OLD, *BESIDE_MOVING, "Plants", "Turning", "Mixed")
     margin_of = "distance in the law less what the plants take"
 
     def applies(self, scenario: Scenario) -> bool:
@@ -82,6 +89,7 @@ class SafeBudget(TheoremClaim):
             },
             **({"position_error_m": scenario.position_error_m} if scenario.position_error_m else {}),
             **({"may_stand": stands} if (stands := [n for n in robots if scenario.seen(n)["may_stand"]]) else {}),
+            **({"old_positions": self._old(scenario)} if scenario.asynchronous else {}),
             "pairs": [
                 {
                     "first": pair.first, "second": pair.second, "kind": pair.kind, "law_m": pair.law_m,
@@ -91,6 +99,16 @@ class SafeBudget(TheoremClaim):
             ],
         }  # fmt: skip
 
+    def _old(self, scenario: Scenario) -> list[dict[str, Any]]:
+        """Of each kind of two UGVs: what is promised, and how far off the other one can be at least, m."""
+        groups = (group[0] for group in alike(budget(scenario)) if group[0].kind == "ugv")
+        return [
+            {
+                "first": pair.first, "second": pair.second, "safe_m": pair.promised_m + pair.radii_m,
+                "unsure_m": pair.unsure_m,
+            } for pair in groups
+        ]  # fmt: skip
+
     def check(self, inputs: dict[str, Any]) -> Finding:
         """Check the hypotheses; the theorems are those about the plants that the scenario has."""
         moving = any(pair["kind"] == "moving" for pair in inputs["pairs"])
@@ -99,8 +117,10 @@ class SafeBudget(TheoremClaim):
         if moving:
             named += [*BESIDE_MOVING, *(name for plant in plants for name in plant.passive_theorems)]
         named += OF_ERRORS if "position_error_m" in inputs else OF_STANDING if "may_stand" in inputs else ()
+        named = [*(named if inputs["pairs"] else ()), *(OF_OLD if "old_positions" in inputs else ())]
         claim = SafeBudget()
         claim.theorems = (*dict.fromkeys(named),)
+        claim.margin_of = self.margin_of if inputs["pairs"] else OLD
         return TheoremClaim.check(claim, inputs)
 
     def hypotheses(self, inputs: dict[str, Any]) -> Sequence[Hypothesis]:
@@ -110,7 +130,16 @@ class SafeBudget(TheoremClaim):
             for name, (plant, speed) in _plants(inputs).items()
             for need in plant.needs(speed)
         ]
-        return [*stable(gain, h), *needs, *self._pairs(inputs)]
+        old = [
+            Hypothesis.of(
+                OLD,
+                f"{pair['first']}, {pair['second']}: {pair['safe_m']:.6g} m are promised to UGVs that reckon with "
+                f"{pair['unsure_m']:.6g} m of the other's way, or more",
+                decimal(pair["safe_m"]), "m", strict=True,
+            )
+            for pair in inputs.get("old_positions", ())
+        ]  # fmt: skip
+        return [*stable(gain, h), *needs, *old, *self._pairs(inputs)]
 
     def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
         error_m = inputs.get("position_error_m", 0.0)

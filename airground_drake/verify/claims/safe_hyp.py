@@ -27,6 +27,7 @@ from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_u
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import inequalities_of
 from airground_drake.verify.runs.demands import differences
+from airground_drake.verify.runs.old_positions import missed_m, unsure_m
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
@@ -131,7 +132,9 @@ class SafeHyp(TraceClaim):
         "what the scenario says; one of the user's own is "
         "judged by its steps alone. Where robots act on measured positions, the inequalities are those of the pair as "
         "measured, errors were within their bound, and d is that of the true bodies. Where messages between UGVs may "
-        "be lost, a UGV stood unless it knew that those whose message it lacked were far."
+        "be lost, a UGV stood unless it knew that those whose message it lacked were far. Where UGVs act on old "
+        "positions (`control.law: asynchronous`), each of their steps kept off all places where the other could be "
+        "until that one decided again, up to e, and two of them kept d less the sum of all e."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -142,6 +145,8 @@ class SafeHyp(TraceClaim):
         r"\text{ m}, \quad A' = A \text{ or } A/2",
         r"n^\top (p_i^{k+1} - p_i^k) \ge \min(0, \, d + V h - D) - e_i, \quad \lVert \dot{o}_j \rVert \le V \quad "
         r"\text{(obstacle that may move)}",
+        r"n^\top s \ge d + \rho - D - e \;\; (D \ge d + \rho), \text{ or } D \, n^\top s \ge \rho \lVert s \rVert "
+        r"- e d / 2, \text{ or } s = 0, \quad \rho = V (t_k - t_{\mathrm{heard}} + h) \quad \text{(old positions)}",
         r"D(0) \ge d, \quad A h \le 1, \quad \lVert v \rVert \le v_{\max}, \quad v_z = 0 \text{ (UGV)}, \quad "
         r"R \ge d + c h",
     )
@@ -155,7 +160,8 @@ class SafeHyp(TraceClaim):
         "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
         "apart count as one instant. With errors of positions D and n are those of measured ones and steps are true: a "
         "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands. "
-        "The same holds for two robots of which one may lack the other's message."
+        "The same holds for two robots of which one may lack the other's message. Old positions are those that the "
+        "sender had at the recorded sample at which it sent the last message that arrived."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
@@ -167,6 +173,8 @@ class SafeHyp(TraceClaim):
         "late or never drive backwards must be clear then, too, and so must their ways under commands already given, "
         "for the time of the delay. If they are not, nothing is promised for the pair.",
         "All robots act on the same measured positions, those that are recorded.",
+        "With `control.law: asynchronous` UGVs are discs that move as they are told, and what one hears of another one "
+        "was true when it was sent.",
         "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",
     )
     does_not_establish = (
@@ -180,7 +188,7 @@ class SafeHyp(TraceClaim):
         "Safety.safe_always", "Safety.recovers", "Safety.unseen", "Safety.standing", "Safety.capped",
         "Convex", "Budget", "Pieces", "Plants", "Turning", "Passive.own_doing", "Passive.kept", "Passive.since",
         "Passive.restored", "Passive.held_off", "Mixed.drifting", "Mixed.unicycle_chord", "Mixed.lagging",
-        "Mixed.delayed", "Mixed.shares", "LawChecker.sound", "LawChecker.obeys_exactly",
+        "Mixed.delayed", "Mixed.shares", "Async", "LawChecker.sound", "LawChecker.obeys_exactly",
     )  # fmt: skip
     exercised_by = "avoidance inequalities that bound a command at a control sample"
 
@@ -295,6 +303,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     longest = {name: _longest(way, float(last)) for name, way in places.items()}
     pairs, of_law, bounds = pairs_of(trace), _gain(trace), bounds_of(trace)
     reach = np.array([pair.law_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
+    reach += [_unsure_m(trace, pair) if pair.asynchronous else 0.0 for pair in pairs]
     beyond = SCREEN_M + np.array([pair.cover_m for pair in pairs])  # of the bodies from the points that are steered
     for k in np.flatnonzero(apart_of(trace) <= reach + beyond).tolist():
         pair = pairs[k]
@@ -305,6 +314,9 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         there, planar = slice(begin, end), is_planar(trace, pair.first)
         first = places[pair.first][there]
         beside = _beside(trace, pair, places, there, float(reach[k]))
+        if pair.asynchronous:
+            yield _of_old_positions(trace, pair)
+            continue
         both = bounds[pair.first], bounds.get(pair.second, AT_REST)
         gain = of_law * Fraction(part_of_gain(*both))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
@@ -330,6 +342,22 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
                 kept = kept_distance(points, *both, gain=trace.scenario.control.avoidance_gain_1_s) - pair.radii_m
                 gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
         yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
+
+
+def _unsure_m(trace: Trace, pair: Pair) -> float:
+    """The largest way that one of two UGVs had to reckon with of the other one, m."""
+    return max(float(unsure_m(trace, *both).max()) for both in permutations((pair.first, pair.second)))
+
+
+def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
+    """What two UGVs keep that act on old positions of each other: theorem Async.old_positions."""
+    missed = missed_m(trace, pair.first, pair.second, pair.law_m) + missed_m(trace, pair.second, pair.first, pair.law_m)
+    places = [trace.position(name)[0] for name in (pair.first, pair.second)]
+    short = shortage(places[0], places[1], pair.law_m)
+    lost = sum(map(Fraction, missed.tolist()), short)
+    if lost > Fraction(pair.law_m) / 2:
+        return Guarantee(pair, missed, rounded_up(short), -inf, "the steps miss half of the distance in all")
+    return Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
 
 
 def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> tuple[Array, Array]:
@@ -376,6 +404,7 @@ def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]
         pair, missed_m = promised.pair, promised.missed_m
         gain = float(_gain(trace)) * part_of_gain(bounds[pair.first], bounds.get(pair.second, AT_REST))
         lost = np.maximum(missed_m / gain - pair.drift_m, 0.0) if gain else missed_m * len(t)
+        lost = np.cumsum(missed_m) if pair.asynchronous else lost
         about = {"first": pair.first, "second": pair.second}
         yield _Hypothesis(AVOIDANCE, "m", t, 0.0 - lost, DISTANCE_TOLERANCE_M, about)
 
@@ -471,7 +500,7 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
 
 def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
     """UGVs stand where they lack a message of another one that is not surely far."""
-    if trace.scenario.ugv_links is None or not trace.scenario.ugv_links.loss:
+    if trace.scenario.asynchronous or trace.scenario.ugv_links is None or not trace.scenario.ugv_links.loss:
         return
     t, period, bounds = trace.sampled("t_s"), trace.scenario.control.period_s, bounds_of(trace)
     speed = {ugv: bounds[ugv].speed_m_s for ugv in trace.ugvs}

@@ -67,7 +67,7 @@ class Demand(NamedTuple):
     # How far the two bodies may be off the recorded straight lines in all, m; or, where the law's points are recorded,
     # what the law adds to the distance.
     room_m: Fraction = Fraction(0)
-    late: bool = False  # whether one of the two is a robot with a lag or a delay
+    late: bool = False  # whether one of the two has a lag or a delay, or they act on old positions of each other
     called: tuple[str, str] = ("", "")  # what the scenario calls the two, where `first` and `second` are names for Coq
 
     @property
@@ -211,7 +211,8 @@ def demands_of(trace: Trace, *, steered: bool = False) -> list[Demand]:
             room = law_m(trace, demand.body_m, demand.first, demand.second) - demand.body_m
         else:
             room = sum((lines[name] for name in names), Fraction(0))
-        demanded.append(demand._replace(room_m=room, late=any(_bounds(trace, name).late for name in names)))
+        old = trace.scenario.asynchronous and {demand.first, demand.second} <= set(trace.ugvs)
+        demanded.append(demand._replace(room_m=room, late=old or any(_bounds(trace, name).late for name in names)))
     return demanded
 
 

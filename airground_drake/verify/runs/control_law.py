@@ -11,6 +11,7 @@ from airground_drake.base.arrays import Array, Indices
 from airground_drake.scenario.schema import Control
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.shortfalls import demanded
+from airground_drake.verify.runs.old_positions import heard_places, unsure_m
 from airground_drake.verify.runs.pairs import contacts, is_planar, pairs_beside, parts_of
 
 PLANE = np.array([1.0, 1.0, 0.0])  # directions in which a UGV can move
@@ -50,6 +51,26 @@ def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Arr
     return np.where(speed > 0.0, np.maximum(speed - (distance - safe) / period_s, 0.0), 0.0)
 
 
+def _towards_old(
+    normal: Array, bound: Array, distance: Array, safe: Array, unsure: Array, period_s: float
+) -> tuple[Indices, Array, Array]:
+    """The inequalities with those towards old positions in their form: which they come from, normals, bounds."""
+    # Within d + rho of an old position the velocity stays in a cone, between two lines in the plane; without a way that
+    # surely leads off nothing is allowed, which two inequalities say that contradict each other.
+    excess, k = distance - safe - unsure, np.arange(len(bound))
+    bound = np.where(unsure > 0.0, -excess / period_s, bound)
+    cone = (unsure > 0.0) & (excess < 0.0)
+    rows = np.concatenate([k[~cone], k[cone], k[cone]])
+    side = np.repeat([0.0, 1.0, -1.0], [(~cone).sum(), cone.sum(), cone.sum()])
+    cosine = np.abs(side) * np.minimum(unsure[rows] / np.maximum(distance[rows], 1e-300), 1.0)
+    normal, bound = normal[rows], np.where(cone[rows], 0.0, bound[rows])
+    sine, turned = np.sqrt(1.0 - cosine**2), np.stack([-normal[:, 1], normal[:, 0], np.zeros(len(rows))], axis=1)
+    normal = sine[:, None] * normal + (side * cosine)[:, None] * turned
+    lost = (side != 0.0) & (cosine == 1.0)
+    normal[lost], bound[lost] = side[lost, None] * [1.0, 0.0, 0.0], 1.0
+    return rows, normal, bound
+
+
 def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
     """The inequalities of a robot at the control samples of its run, beside all that is within sensing range."""
     samples = trace.sample_rows
@@ -63,10 +84,12 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     own = place(robot)
     others = [name for name in trace.robots if name != robot]
     near = contacts(trace, own, samples, control.sensing_range_m, planar=planar)
-    offset = own[:, None] - np.stack([place(name) for name in others], axis=1)
+    there = [heard_places(trace, robot, name) if pairs[name].asynchronous else place(name) for name in others]
+    old = [unsure_m(trace, robot, name) if pairs[name].asynchronous else np.zeros(len(own)) for name in others]
+    offset, unsure = own[:, None] - np.stack(there, axis=1), np.stack(old, axis=1)
     apart = np.sqrt(np.square(offset).sum(axis=2))
-    sample, other = np.nonzero(apart <= control.sensing_range_m)
-    apart, offset = apart[sample, other], offset[sample, other]
+    sample, other = np.nonzero((apart <= control.sensing_range_m) | (unsure > 0.0))
+    apart, offset, unsure = apart[sample, other], offset[sample, other], unsure[sample, other]
     beside = [*(pairs[name] for name in parts.names), *(pairs[name] for name in others)]
     which = np.append(parts.owner[near.core], len(parts.names) + other)
     safe, share, speed = (
@@ -79,6 +102,10 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     when = np.append(near.place, sample)
     number = np.array([trace.robots.index(name) for name in others], dtype=np.intp)
     column = np.append(near.core, len(parts.owner) + number[other])
+    if unsure.any():
+        unsure = np.append(np.zeros(len(near.core)), unsure)
+        k, normal, bound = _towards_old(normal, bound, distance, safe, unsure, control.period_s)
+        when, column, retreat = when[k], column[k], retreat[k]
     moves = np.array([trace.scenario.barriers[name].moves is not None for name in parts.names], dtype=np.bool_)
     rank = np.concatenate([np.where(moves[parts.owner], 2, 0), np.ones(len(trace.robots), dtype=np.intp)])
     order = np.lexsort([column, rank[column], when])

@@ -19,6 +19,7 @@ from airground_drake.verify.engines.outlines import (
     unpacked,
 )
 from airground_drake.verify.runs.control_law import ON_TOP
+from airground_drake.verify.runs.old_positions import unsure_s
 from airground_drake.verify.runs.pairs import carried, declared_pairs, pairs_beside, parts_of
 
 NO_INTERVENTION = "a"  # method without interventions
@@ -44,12 +45,15 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     m = len(still)
     number = {name: k for k, name in enumerate([*barriers, *robots])}
     safe, share = np.zeros((2, len(robots), len(number)))
+    late_s = unsure_s(scenario)
     for pair in declared_pairs(trace):
         first, second = number[pair.first], number[pair.second]
         for i, j in ((first, second), (second, first)):
             if i >= len(barriers):  # a barrier avoids nothing
                 i -= len(barriers)
                 safe[i, j], share[i, j] = pair.law_m, pair.share
+                if pair.asynchronous:
+                    share[i, j] = -late_s * scenario.ugvs[robots[j - len(barriers)]].max_speed_m_s
     outlines = [*outlines_of(trace)]
     at_rest, that_move = (np.concatenate([np.empty(0), *(outlines[k] for k in some)]) for some in (still, moving))
     column = np.concatenate([parts.owner[still], len(barriers) + everybody, parts.owner[moving]])
@@ -77,7 +81,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             "period_s": control.period_s,
             "sensing_range_m": control.sensing_range_m,
         }
-        if scenario.position_error_m:
+        if scenario.stands:
             wanted[name]["stands"] = True
         if len(moving):
             wanted[name]["moving_outlines"] = that_move

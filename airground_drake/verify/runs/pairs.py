@@ -41,7 +41,7 @@ from airground_drake.verify.engines.outlines import (
     over_time,
     within,
 )
-from airground_drake.verify.pair_kinds import MOVING, apart
+from airground_drake.verify.pair_kinds import ASYNCHRONOUS, MOVING, apart
 
 
 class Pair(NamedTuple):
@@ -63,6 +63,7 @@ class Pair(NamedTuple):
     cover_m: float = 0.0
     drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
     error_m: float = 0.0  # sum of the bounds of the errors of the measured positions
+    asynchronous: bool = False  # whether each of two UGVs acts on an old position of the other one
     slip_m: float = 0.0  # how much of its command the robot may miss in a control period
     # How far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
     drawn_m: float = 0.0
@@ -136,6 +137,7 @@ def pairs_by(
             cover_m=sum(plant.rolling_m + plant.drift_m_s * period for plant in (own, other)),
             drift_m=sum(plant.drift_m_s / (gain * part) for plant in (own, other) if plant.drift_m_s),
             error_m=own.error_m + other.error_m,
+            asynchronous=given.kind == ASYNCHRONOUS,
             slip_m=own.drift_m_s * period,
             drawn_m=drawn,
             under_way_s=max(own.delay_s, other.delay_s) if needs_start else None,

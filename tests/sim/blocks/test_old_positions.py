@@ -1,0 +1,201 @@
+"""UGVs that act on positions of each other of any age: the asynchronous law, and what judges it."""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles import faults_of
+from sim.blocks.test_positions import ABOUT_D, APART_M, PERIOD_S, checked, forged, found, least_m, team
+
+from airground_drake.base.arrays import Array
+from airground_drake.base.errors import PluginError, ScenarioError
+from airground_drake.base.registry import METHODS
+from airground_drake.check import safety
+from airground_drake.model.geometry import outline
+from airground_drake.model.law.kernels import STANDING, Layer, avoid_one, fill_half_spaces
+from airground_drake.scenario.budget import budget
+from airground_drake.scenario.load import from_data, load, resolved
+from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.world import make_world
+from airground_drake.sim.blocks.positions import AsynchronousUgvController
+from airground_drake.sim.components import make_planner
+from airground_drake.sim.diagram import make_monitor
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
+from airground_drake.verify import judge
+from airground_drake.verify.claims.safe_budget import SafeBudget
+
+OLD = {"control.law": "asynchronous"}
+HYPOTHESES = ("SAFE-TRACE", "SAFE-HYP")
+
+
+def old_team(seed: int, delay_s: float, loss: float, changes: dict[str, Any] | None = None) -> Scenario:
+    links = {"delay_s": delay_s, "loss": loss}
+    return from_data(resolved(team(seed, None)) | {"channel": {"ugvs": links}}, "test", OLD | (changes or {}))
+
+
+@cache
+def run(seed: int, delay_s: float, loss: float, method: str = "a") -> Trace:
+    return simulate(old_team(seed, delay_s, loss), method)
+
+
+@pytest.mark.parametrize(("delay_s", "loss"), [(0.0, 0.0), (0.1, 0.5), (0.3, 0.1), (0.5, 0.5)])
+@pytest.mark.parametrize("method", ["a", "d"])
+def test_the_distance_is_kept_whatever_the_age_of_positions(delay_s: float, loss: float, method: str) -> None:
+    for seed in range(2):
+        trace = run(seed, delay_s, loss, method)
+        assert least_m(trace) >= APART_M - 1e-9
+        assert set(found(trace, *(ABOUT_D if method == "d" else HYPOTHESES)).values()) == {"holds"}
+        (verdict,) = judge(trace, ["SAFE-HYP"])
+        assert verdict.exercised
+        assert verdict.margin == pytest.approx(0.0, abs=1e-9)
+        assert safety.safe_hyp(checked(trace)).status == "holds"
+        assert not faults_of(trace)
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 10**6), delay_s=st.floats(0.1, 0.5), loss=st.floats(0.0, 0.5),
+    period_s=st.sampled_from([0.025, 0.05, 0.1]),
+)  # fmt: skip
+def test_no_drawn_team_comes_nearer_than_promised(seed: int, delay_s: float, loss: float, period_s: float) -> None:
+    trace = simulate(old_team(seed, delay_s, loss, {"control.period_s": period_s}), "a")
+    assert least_m(trace) >= APART_M - 1e-9
+    assert set(found(trace, *HYPOTHESES).values()) == {"holds"}
+    assert safety.safe_hyp(checked(trace)).status == "holds"
+
+
+class Forgetful(AsynchronousUgvController):
+    """Takes every position for one of this sample."""
+
+    def _commanded(self, context: Any, t: float, positions: Array, *about: Any) -> Array:
+        class Now:
+            def Eval(self, of: Any) -> Array:
+                return np.full(len(about[0]) ** 2, t)
+
+        honest, self._heard = self._heard, Now()
+        velocity = super()._commanded(context, t, positions, *about)
+        self._heard = honest
+        return velocity
+
+
+def test_who_ignores_the_age_breaks_distances_and_both_programs_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("airground_drake.sim.blocks.positions.AsynchronousUgvController", Forgetful)
+    traces = [simulate(old_team(seed, 0.3, 0.5), "a") for seed in range(4)]
+    assert sum(least_m(trace) < APART_M - 1e-3 for trace in traces) >= 3
+    for trace in traces:
+        assert found(trace, "SAFE-HYP") == {"SAFE-HYP": "refuted"}
+        assert safety.safe_hyp(checked(trace)).status == "refuted"
+        assert "commands" in faults_of(trace)
+
+
+def test_a_position_that_is_older_than_it_was_is_found() -> None:
+    trace = run(0, 0.1, 0.5)
+    pairs = [(one, other) for one in trace.ugvs for other in trace.ugvs if one != other]
+    judged = 0
+    for first, second in pairs:
+        heard = trace.sampled(f"{first}.heard_{second}_s")
+        old = replace(
+            trace, samples=trace.samples.assign(**{f"{first}.heard_{second}_s": np.maximum(heard - 1.0, 0.0)})
+        )
+        assert "positions" in faults_of(old)
+        ours, theirs = found(old, "SAFE-HYP")["SAFE-HYP"], safety.safe_hyp(checked(old)).status
+        assert ours == theirs
+        judged += ours == "refuted"
+    assert judged >= 2
+
+
+def test_a_position_of_no_sample_so_far_is_found() -> None:
+    trace = run(0, 0.1, 0.5)
+    for value in (1e9, 0.5 * PERIOD_S, -1.0):
+        wrong = forged(trace, "ugv1.heard_ugv2_s", value, 20)
+        assert found(wrong, "SAFE-HYP") == {"SAFE-HYP": "refuted"}
+        ours = safety.safe_hyp(checked(wrong))
+        assert ours.because is not None
+        assert ours.because.rule == "position heard before"
+
+
+def towards(x: float, y: float, unsure: float, task: Array) -> Array:
+    """The command of a UGV at (x, y) with a task, (3,), m/s, towards an old position at the origin; d = 0.6 m."""
+    one = np.zeros(1, dtype=np.intp)
+    normal, (bound, retreat) = np.empty((2, 3)), np.empty((2, 2))
+    count = fill_half_spaces(
+        np.array([x, y, 0.0]), np.array([1.0, 1.0, 0.0]), outline.stacked([]), outline.balls(np.zeros(3)), one, one,
+        np.zeros((1, 3)), np.array([0.6]), np.array([-unsure]), Layer(8.0, PERIOD_S, 0.1, STANDING),
+        np.empty(2, dtype=np.intp), normal, bound, retreat,
+    )  # fmt: skip
+    command: Array = avoid_one(task, normal[:count], bound[:count], STANDING, 2.0)
+    return command
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    at=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), unsure=st.floats(0.01, 2.0),
+    task=st.tuples(st.floats(-1.4, 1.4), st.floats(-1.4, 1.4)),
+)  # fmt: skip
+def test_commands_keep_off_all_places_where_the_other_one_can_be(
+    at: tuple[float, float], unsure: float, task: tuple[float, float]
+) -> None:
+    """Beyond the sensing range, too. What is allowed is done; in the cone, beyond it and where no way leads off."""
+    asked = np.array([*task, 0.0])
+    command, place = towards(*at, unsure, asked), np.array([*at, 0.0])
+    apart = float(np.linalg.norm(place))
+    along, speed = float(place @ command) / max(apart, 1e-300), float(np.linalg.norm(command))
+    if apart >= 0.6 + unsure:
+        assert along >= -(apart - 0.6 - unsure) / PERIOD_S - 1e-9
+    else:
+        assert apart * along >= unsure * speed - 1e-9
+        if apart <= unsure:
+            assert speed == 0.0
+    wished = float(place @ asked) / max(apart, 1e-300)
+    free = wished >= -(apart - 0.6 - unsure) / PERIOD_S + 1e-9 if apart >= 0.6 + unsure else (
+        apart > unsure + 1e-6 and apart * wished >= unsure * np.linalg.norm(asked) + 1e-6
+    )  # fmt: skip
+    if free:
+        assert command == pytest.approx(asked, abs=1e-12)
+
+
+def test_plans_keep_what_the_law_keeps_and_the_budget_tells_it() -> None:
+    scenario = old_team(0, 0.12, 0.5)
+    fastest = max(ugv.max_speed_m_s for ugv in scenario.ugvs.values())
+    planner = make_planner(scenario, METHODS["d"], "uav")
+    assert planner.robot_distance == pytest.approx(APART_M + 4 * PERIOD_S * fastest)
+    kept = [pair.unsure_m for pair in budget(scenario) if pair.kind == "ugv"]
+    assert max(kept) == pytest.approx(4 * PERIOD_S * fastest)
+    assert SafeBudget().judge(SafeBudget().inputs(scenario)).status == "proved"
+
+
+LAG = {"ugvs.ugv1.plant": {"kind": "lag", "time_constant_s": 0.1}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"channel": None}, r"control\.law: .*asynchronous.*channel\.ugvs: \{\} would do"),
+        (LAG, r"ugvs\.ugv1\.plant: .*first_order with control\.law: asynchronous"),
+        ({"sensing": {"position_error_m": 0.01}}, "sensing: .*no theorem is about old positions with errors"),
+        ({"sensing": {"uav_error_m": 0.01}}, "sensing: "),
+        ({"runs": {"c": {"method": "c"}}}, r"runs\.c\.method: .*a or d with control\.law: asynchronous"),
+        ({"runs": {"a": {"method": "a", "composition": "recursion_listed"}}}, "augmented with control.law"),
+        ({"ugv_controller": {"kind": "mine.py:Mine"}}, "a controller of your own knows all positions"),
+        ({"ugvs.ugv2.target_m": [-4.0, 0.0, 0.0], "ugvs.ugv1.target_m": [-4.0, 0.9, 0.0]}, r"ugv2\.target_m: .* old"),
+        ({"control.law": "late"}, "shared, asynchronous"),
+    ],
+)
+def test_what_no_theorem_covers_is_refused(changes: dict[str, Any], said: str) -> None:
+    data = resolved(old_team(0, 0.3, 0.1)) | {key: changes[key] for key in changes if "." not in key}
+    with pytest.raises(ScenarioError, match=said):
+        from_data(data, "test", {key: changes[key] for key in changes if "." in key})
+
+
+def test_the_shared_law_is_written_and_built_as_if_there_were_no_other() -> None:
+    assert "law" not in resolved(load("case_a"))["control"]
+    assert make_world(load("case_a")).unsure_s == 0.0
+    assert simulate(old_team(0, 0.1, 0.5), "a", engine="batch").samples.equals(run(0, 0.1, 0.5).samples)
+    with pytest.raises(PluginError, match="a monitor sees true positions"):
+        make_monitor(old_team(0, 0.1, 0.5))
