@@ -64,7 +64,7 @@ def bounds_of(robot: Any, period_s: float, seen: dict[str, Any]) -> Bounds:
 
 
 def made(given: list[dict[str, Any]], period_s: float) -> Plant:
-    """The same of the value of `plant` in a resolved scenario."""
+    """The plant that the value of `plant` in a resolved scenario says, with a control period, s."""
     return plant_of(SimpleNamespace(plant=_LIST.validate_python(given, context=RECORDED)), period_s)
 
 

@@ -336,7 +336,7 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
         return cls._ID
 
     def solver_id(self) -> SolverId:
-        """As `id`."""
+        """The identifier under which options of this solver are stored."""
         return self._ID
 
     def available(self) -> bool:

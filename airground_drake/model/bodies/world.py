@@ -165,7 +165,7 @@ class World:
         return tuple(body for body in self.bodies if body.plant is not None)
 
     def at(self, near: Neighbours, t: float) -> Neighbours:
-        """The same neighbours at time t, s: obstacles that are not there are nowhere.
+        """Neighbours as they are at time t, s: obstacles that are not there are nowhere.
 
         A controller that asks at its samples has an obstacle from the first sample at or after `appears_s` on.
         """

@@ -64,7 +64,7 @@ def _polar(words: npt.NDArray[np.uint32], values: Array, made: int, wanted: int)
 
 
 def _of_drake(seed: int, count: int, sets: int) -> Array:
-    """The same numbers, by Drake."""
+    """The numbers of `gaussians`, made by Drake itself."""
     builder = DiagramBuilder()
     source = builder.AddSystem(RandomSource(RandomDistribution.kGaussian, count, 1.0))
     log = LogVectorOutput(source.get_output_port(), builder, 1.0)

@@ -416,7 +416,7 @@ def _holds(breaks: Array, places: Array) -> Array:
 
 
 def _with_end(holds: Array) -> Array:
-    """The same with a row that is not used: as many as breaks."""
+    """Pieces of a first-order hold with one more row, which is not used, so that there are as many as breaks."""
     return np.concatenate([holds, np.zeros((1, *holds.shape[1:]))])
 
 

@@ -91,7 +91,7 @@ class JudgedPair(NamedTuple):
 
     @property
     def hypotheses(self) -> dict[str, bool]:
-        """Those of the theorem, and whether they held."""
+        """Hypotheses of the theorem, and whether they held."""
         obeys = {"obeys the avoidance law in every interval": self.missed_m <= SMALL}
         if self.passive:
             return obeys | {"the obstacle keeps its declared speed": self.too_fast_m_s == 0.0}
