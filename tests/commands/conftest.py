@@ -64,5 +64,4 @@ def made_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def folder(made_report: Path, tmp_path: Path) -> Path:
-    """A copy of it, to be changed."""
     return shutil.copytree(made_report, tmp_path / "report")

@@ -34,7 +34,6 @@ GONE = {"name": "no_such.module:It", "parameters": {}}
 
 @pytest.fixture(scope="module")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A report of a run of a few seconds."""
     folder = tmp_path_factory.mktemp("check") / "short"
     settings = ("duration_s=3", "runs={d: {method: d}}", "reproduction=[]", "choices=[]")
     assert report(["case_a", "-o", str(folder), "-q", *(w for each in settings for w in ("--set", each))]) in (0, 1)
@@ -43,7 +42,6 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def checked(short: Path) -> tuple[str, str]:
-    """What all three programs say of it on standard output and standard error."""
     with (
         pytest.MonkeyPatch.context() as patch,
         redirect_stdout(StringIO()) as said,
@@ -122,7 +120,6 @@ def test_claims_are_judged_again_where_drake_cannot_be_imported(short: Path) -> 
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """SHA-256 of each file of a report."""
     return {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.rglob("*") if path.is_file()}
 
 
@@ -148,7 +145,6 @@ def test_coq_proves_the_runs_again(short: Path, tmp_path: Path, airground: Airgr
 def test_third_party_claims_and_other_seeds_are_made_again_where_allowed(
     tmp_path: Path, airground: Airground, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What the claim prints is not taken for a line."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent.parent))
     settings = ("duration_s=1", "claims={MINE: 'check.foreign:Short'}")
     words = [word for each in settings for word in ("--set", each)]

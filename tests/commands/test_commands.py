@@ -35,11 +35,13 @@ for line in {WITHOUT_WORK}:
 """
 
 
-def test_slow_packages_are_imported_when_they_are_used() -> None:
+def test_slow_packages_are_imported_when_they_are_used_and_each_command_has_its_help() -> None:
     """Whichever line imports one is the first that has it after its name."""
     ran = subprocess.run([sys.executable, "-c", IMPORTED], capture_output=True, text=True, check=True)
     assert ran.stderr.splitlines() == [*WITHOUT_WORK]
-    assert all(f"  {name} " in ran.stdout for name in COMMANDS)
+    for name in COMMANDS:
+        assert f"  {name} " in ran.stdout  # a line of `airground --help`
+        assert f"usage: airground {name} " in ran.stdout  # the first line of its own
 
 
 def test_module_and_console_script_are_the_same_command() -> None:
@@ -58,9 +60,10 @@ def test_list_has_every_name(airground: Airground) -> None:
 
 
 def test_list_tells_all_about_one_name(airground: Airground) -> None:
-    """Every name of every kind has a text; parameters are those that the class takes."""
     for kind, names in KINDS.items():
-        for name, _ in names():
+        for name, _ in [*names()][
+            : 1 if kind == "scenarios" else None
+        ]:  # each time the title of every scenario is read
             assert airground("list", kind, name).startswith(f"{name}: ")
     assert "Parameters: speed_m_s, clearance_m = 0.05, follow_s = 5.0." in airground("list", "policies", "detour")
     assert "Does not establish: " in airground("list", "claims", "SAFE-TRACE")
@@ -116,7 +119,6 @@ def test_init_writes_a_scenario_and_prints_what_runs_it(
 
 
 def test_init_copies_a_shipped_scenario(tmp_path: Path, airground: Airground) -> None:
-    """But for its name: the copy of each is a scenario with the same robots, obstacles and runs."""
     for name in shipped():
         airground("init", tmp_path / f"copy_of_{name}.yaml", "--like", name)
         copy, model = load(tmp_path / f"copy_of_{name}.yaml"), load(name)
@@ -270,7 +272,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(
 def test_a_closed_output_pipe_is_no_error() -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    ran = subprocess.run([*AIRGROUND, "list", "--schema"], stdout=writing, stderr=subprocess.PIPE, check=False)
+    ran = subprocess.run([*AIRGROUND, "list", "methods"], stdout=writing, stderr=subprocess.PIPE, check=False)
     os.close(writing)
     assert (ran.returncode, ran.stderr) == (128 + signal.SIGPIPE, b"")
 

@@ -41,7 +41,6 @@ TABLES: dict[str, Callable[[], pa.Table]] = {
 
 @pytest.fixture(scope="module")
 def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A report with the trace of one of its runs."""
     folder, scenario = tmp_path_factory.mktemp("honest"), make_scenario()
     (folder / "report.json").write_text(json.dumps(built(scenario, make_traces(scenario), FINE)))
     made = make_trace(scenario, "c", GOING_ROUND, SUCCESS)
@@ -52,14 +51,11 @@ def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def hostile(honest: Path, tmp_path: Path) -> Path:
-    """A copy of it, to be changed."""
     return shutil.copytree(honest, tmp_path / "reports" / "hostile")
 
 
 @pytest.fixture(autouse=True)
 def _ends() -> Iterator[None]:
-    """A command that hangs fails."""
-
     def over(*_: object) -> None:
         raise AssertionError("it hangs")
 

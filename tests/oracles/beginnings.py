@@ -40,7 +40,6 @@ class Beginning(NamedTuple):
 
     @property
     def known(self) -> tuple[Cores, Array]:
-        """The cores of what is at rest, (M,), and the distances that are kept from them, (M,), m."""
         return self.refused.still, self.refused.safe[: len(self.refused.still.base)]
 
 
@@ -79,18 +78,7 @@ def beginning(trace: Trace, t: float, number: int) -> Beginning:
 def scene(
     trace: Trace, on: ProposalRecord, t: float, after: Array, periods: int, still: Cores, points: Array, law: Array
 ) -> Scene:
-    """The closed loop of the UGV that a proposal is for, with the obstacles that move and are within its range.
-
-    Args:
-        trace: the run.
-        on: the proposal.
-        t: when it begins, s.
-        after: the control samples, since then, (S + 1,), s.
-        periods: for which the proposal is executed.
-        still: cores to keep away from, (M,).
-        points: the same that move, at the samples, (S + 1, K, 3), m.
-        law: distances to keep, m, shares of the inequalities, and expected speeds, m/s, (3, M + K).
-    """
+    """The closed loop of the UGV that a proposal is for, with the obstacles that move and are within its range."""
     around = movers(trace, on.ugv, t, after)
     origins = np.stack([each.places for each in around], axis=1) if around else np.empty((len(after), 0, 3))
     of_movers = np.array([(pair.law_m, pair.share, pair.speed_m_s) for pair, *_ in around]).reshape(-1, 3).T
@@ -158,11 +146,7 @@ def _among_robots(trace: Trace) -> list[Pair]:
 
 
 def known_cores(trace: Trace, row: dict[Any, Any], on: ProposalRecord) -> tuple[Cores, Array]:
-    """Parts that a UGV had sensed when it decided, and those of the message that it believed, as recorded.
-
-    Returns:
-        Their cores, (k,); and distances that the UGV keeps from them, m, shares, and expected speeds, m/s, (3, k).
-    """
+    """Parts that a UGV had sensed when it decided, and those of the message that it believed, as recorded."""
     known, told = (np.array(row[name], dtype=np.intp) for name in ("known", "told"))
     parts, pairs = still_parts(trace), pairs_beside(trace, on.ugv)
     beside = [pairs[parts.names[k]] for k in parts.owner[known]]

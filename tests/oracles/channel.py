@@ -17,12 +17,10 @@ Row = dict[str, Any]
 
 
 def has_channel(trace: Trace) -> bool:
-    """Whether messages of this run may be late or lost."""
     return trace.scenario.channel is not None
 
 
 def rows_of(trace: Trace) -> list[Row]:
-    """The table of messages as rows, those that did not arrive last."""
     return trace.derived(
         "message rows", lambda: trace.messages.sort_values("received_s", kind="stable").to_dict("records")
     )

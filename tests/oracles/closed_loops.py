@@ -163,7 +163,6 @@ def move_apart(ways: Sequence[Array]) -> bool:
 
 
 def in_batches(items: Iterable[T], scenes_of: Callable[[T], Sequence[Scene]]) -> Iterator[list[T]]:
-    """Items in batches whose scenes fit into memory side by side."""
     batch, count, largest = list[T](), 0, 0
     for item in items:
         scenes = scenes_of(item)

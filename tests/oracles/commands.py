@@ -45,7 +45,6 @@ class Law(NamedTuple):
 
 
 def wrong_commands(trace: Trace) -> list[Fault]:
-    """For each robot the first control sample at which its command is not the law's."""
     samples = trace.sample_rows
     laws = {ugv: _law_of_ugv(trace, ugv, samples) for ugv in trace.ugvs}
     for name, uav in trace.scenario.aerial.items():
@@ -95,7 +94,6 @@ def _law_of_ugv(trace: Trace, ugv: str, samples: Rows) -> Law:
 
 
 def _preset_rates(waypoints: Array, speed: float, t: Array) -> list[Array]:
-    """Velocity of the preset trajectory, (S, 3), m/s, before and after each instant; they differ at corners only."""
     times = corner_times(waypoints, speed)
     legs = np.diff(waypoints, axis=0)
     lengths = np.linalg.norm(legs, axis=1, keepdims=True)

@@ -23,7 +23,6 @@ Part = tuple[float, ...]
 
 
 def wrong_messages(trace: Trace) -> list[Fault]:
-    """Proposals, decisions and answers out of turn, and proposals whose map is not the UAV's."""
     return [*_out_of_turn(trace), *_answered_otherwise(trace), *_wrong_maps(trace)]
 
 

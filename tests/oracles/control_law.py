@@ -37,13 +37,11 @@ class Inequalities(NamedTuple):
     retreat: Array | None = None
 
     def also(self, normal: Array, bound: Array) -> "Inequalities":
-        """With further ones, (B, E, 3) and (B, E), of the lowest priority; they ask for no retreat."""
         retreat = None if self.retreat is None else np.concatenate([self.retreat, np.zeros_like(bound)], axis=1)
         both = (np.concatenate(parts, axis=1) for parts in ((self.normal, normal), (self.bound, bound)))
         return Inequalities(*both, retreat)
 
     def slack(self, velocity: Array) -> Array:
-        """Slack of velocities (B, 3) in each inequality, (B, K), m/s; inf where nothing is asked."""
         return np.asarray(np.einsum("bkd,bd->bk", self.normal, velocity) - self.bound)
 
 
@@ -87,7 +85,6 @@ class Asked(NamedTuple):
 
 
 def limited(velocity: Array, limit: Array | float) -> Array:
-    """Velocities (B, 3) shortened to a speed limit, a number or (B,)."""
     speed = np.sqrt(np.square(velocity).sum(axis=1))
     return np.asarray(velocity * np.minimum(1.0, limit / np.maximum(speed, 1e-300))[:, None])
 
@@ -149,7 +146,6 @@ def _recursion(below: Array, normal: Array, bound: Array, *, nearest_first: bool
 
 
 def tracking(position: Array, preset: Array, rate: Array, gain: float, limit: Array | float) -> Array:
-    """A UGV's own task (6), within its speed limit."""
     return limited(PLANE * (rate + gain * (preset - position)), limit)
 
 
@@ -174,17 +170,7 @@ def commanded(
     asked: Asked,
     limit: Array,
 ) -> Array:
-    """A UGV's commands by the law of a run, (B, 3): avoidance, and the interventions that are executed, (20).
-
-    Args:
-        trace: the run: its method says what has priority.
-        position: (B, 3).
-        own: its own task (6), (B, 3).
-        given: its avoidance inequalities.
-        rows: those in which an intervention is executed, (E,).
-        asked: the E interventions.
-        limit: speed limits, (B,).
-    """
+    """A UGV's commands by the law of a run, (B, 3): avoidance, and the interventions that are executed, (20)."""
     composition, gain = composed(trace), trace.scenario.control.intervention_gain_1_s
     if trace.meta["method"] in ON_TOP:
         velocity = avoiding(retreating(own, given, limit, planar=True), given, composition, planar=True, limit=limit)
@@ -196,7 +182,6 @@ def commanded(
 
 
 def selected(sent: ProposalRecord) -> Array:
-    """J_int^+ J_int, (3, 3), of a proposal."""
     return np.asarray(np.linalg.pinv(sent.selection) @ sent.selection)
 
 

@@ -47,11 +47,7 @@ PROVED_ROUTES = ("mixed_integer",)
 
 
 def wrong_decisions(trace: Trace) -> list[Fault]:
-    """Everything about the decisions of a run that is not as it should be.
-
-    Raises:
-        TraceError: if the tables of decisions, problems and proposals do not belong together.
-    """
+    """Everything about the decisions of a run that is not as it should be."""
     if trace.meta["method"] not in GATED_METHODS:
         return []
     rows = rows_of(trace)
@@ -177,14 +173,7 @@ def compare_answers(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[De
 
 
 def rule(row: DecisionRecord, standing: str | None, stood: float, gate: Gatekeeper) -> tuple[bool, str]:
-    """Whether a proposal is accepted and why, from the recorded costs.
-
-    Args:
-        row: the decision.
-        standing: the answer to this proposal so far, or None.
-        stood: for how long it has been that, s.
-        gate: the scenario's rule and margins.
-    """
+    """Whether a proposal is accepted and why, from the recorded costs."""
     given = row.given
     if not row.planned:
         return False, "no_plan"
@@ -264,7 +253,6 @@ def compare_with_blocks(each: Bounded) -> Deviation:
 
 
 def neighbours(plan: Array, blocks: int) -> Array:
-    """The plan (N,), those that differ from it in one block, and the constant ones, (B + 3, N)."""
     stages = len(plan)
     count = min(blocks or stages, stages)
     turned = np.arange(stages) * count // stages == np.arange(count)[:, None]

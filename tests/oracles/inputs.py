@@ -31,7 +31,6 @@ EDGE_M = 1e-9
 
 
 def wrong_inputs(trace: Trace) -> list[Fault]:
-    """Decisions whose recorded inputs are not what positions, messages and answers say."""
     return [
         Fault(f"recorded as {name}", str(row["robot"]), float(row["t_s"]), {"due": due, "recorded": recorded})
         for row in trace.decisions.to_dict("records")
@@ -41,7 +40,6 @@ def wrong_inputs(trace: Trace) -> list[Fault]:
 
 
 def _compared(trace: Trace, row: dict[Any, Any]) -> Iterator[tuple[str, list[Any], list[Any]]]:
-    """Each recorded input of a decision with what is due; where nothing was predicted, nothing is recorded."""
     t, ugv, period_s = float(row["t_s"]), str(row["robot"]), trace.scenario.gatekeeper.period_s
     recorded = {name: [*row[name]] for name in ("sensed", "known", "new", "told")}
     if trace.meta["method"] == METHOD and row["accept_stalls"] < 0.0:

@@ -15,10 +15,8 @@ from airground_drake.model.geometry.outline import moved
 from airground_drake.model.law import ugv_law as law
 from airground_drake.sim import components, diagram
 from airground_drake.sim.blocks import controllers
-from airground_drake.sim.blocks.gatekeeper import Gatekeeper
 from airground_drake.uav import database
 from airground_drake.uav.messages import accepted_proposals
-from airground_drake.uav.planner import Planner
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.patience import Commitment, Patience
 from airground_drake.ugv.rollout import ClosedLoop
@@ -50,21 +48,6 @@ def no_feed_forward(patch: pytest.MonkeyPatch) -> None:
             return lambda p, v, z, g: made(p, 0.0 * v, z, g)
 
     patch.setattr(diagram, "UAV_TASKS", Tasks())
-
-
-def executed_whatever_the_answer(patch: pytest.MonkeyPatch) -> None:
-    """The answer is recorded as it was given."""
-    honest, waiting = controllers.UgvController.velocity, list[Proposal | None]()
-
-    def velocity(self: Any, t: float, places: Array, reference: Array, rate: Array, accepted: Any, *law: Any) -> Array:
-        return honest(self, t, places, reference, rate, waiting[:] or accepted, *law)
-
-    def accepted(proposals: Sequence[Proposal | None], answers: Array) -> list[Proposal | None]:
-        waiting[:] = proposals
-        return accepted_proposals(proposals, answers)
-
-    patch.setattr(controllers.UgvController, "velocity", velocity)
-    patch.setattr(controllers, "accepted_proposals", accepted)
 
 
 def executed(choose: Callable[[list[Any], list[Any]], list[Any]]) -> Patch:
@@ -121,25 +104,7 @@ FAR_UAV = "uav.start_m=[20.0, -30.0, 2.0]"
 """Far away, so that its limit matters."""
 
 
-def not_sent(patch: pytest.MonkeyPatch) -> None:
-    """Answers are decided on and not sent."""
-    patch.setattr(Gatekeeper, "_calc_answers", lambda self, context, output: None)
-
-
-def not_withdrawn(patch: pytest.MonkeyPatch) -> None:
-    """A proposal outlives the release of its UGV."""
-    honest = Planner._after_answers
-
-    def after(self: Planner, talks: Any, t: float, places: Any, intervening: Any, *heard: Any, learnt: bool) -> Any:
-        calling = [one or talk.proposal is not None for one, talk in zip(intervening, talks, strict=True)]
-        return honest(self, talks, t, places, calling, *heard, learnt=learnt)
-
-    patch.setattr(Planner, "_after_answers", after)
-
-
 def sent_with(change: Callable[[dict[str, Any]], None]) -> Patch:
-    """Proposals with other contents."""
-
     def proposal(*given: Any, **more: Any) -> Proposal:
         change(more)
         return Proposal(*given, **more)
@@ -156,14 +121,10 @@ def with_law(name: str, value: Callable[[Any], Any]) -> Callable[[ClosedLoop], C
 
 
 class NoRest(Patience):
-    """The tries count anew at once."""
-
     def rested(self, now: Commitment, t: float) -> Commitment:
         return now if now.executing else replace(now, tries=0)
 
 
 class LateByASample(Patience):
-    """A try is over one sample too late."""
-
     def over(self, now: Commitment, t: float) -> bool:
         return t >= now.until + 0.05

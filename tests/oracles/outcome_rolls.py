@@ -10,7 +10,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from oracles.beginnings import Beginning, beginning
-from oracles.closed_loops import NUDGES_M, Scene, in_batches, roll_out, stacked
+from oracles.closed_loops import Scene, in_batches, roll_out, stacked
 from oracles.way_left import bounds_of_way_left
 
 STILL_M = 0.05
@@ -21,9 +21,8 @@ Counts = npt.NDArray[np.int64]
 
 
 class Foreseen(NamedTuple):
-    """The outcome of a choice: places (S + 1, 3), whether it stalls, (25) along the way, bounds of the way left."""
+    """The outcome of a choice: whether it stalls, (25) along the way, bounds of the way left."""
 
-    places_m: Array
     stalls: bool
     integral_m2_s: float
     least_left_m: float
@@ -44,21 +43,13 @@ def _foreseen(trace: Trace) -> Iterator[tuple[Key, tuple[Foreseen, Foreseen]]]:
         yield from zip([key for key, _ in batch], found, strict=True)
 
 
-def nudged(trace: Trace, t: float, number: int) -> list[tuple[Foreseen, Foreseen]]:
-    """Outcomes of refusing and of accepting, under each of `NUDGES_M`, for the decision at t, s, about a proposal."""
-    begun = [beginning(trace, t, number)] * len(NUDGES_M)
-    return _rolled_out(trace, begun, np.concatenate([NUDGES_M, NUDGES_M]))
-
-
-def _rolled_out(
-    trace: Trace, begun: Sequence[Beginning], nudge: Array | float = 0.0
-) -> list[tuple[Foreseen, Foreseen]]:
-    """Outcomes of refusing and of accepting, for some decisions; `nudge` as of `roll_out`."""
+def _rolled_out(trace: Trace, begun: Sequence[Beginning]) -> list[tuple[Foreseen, Foreseen]]:
+    """Outcomes of refusing and of accepting, for some decisions."""
     h, scenes = trace.scenario.control.period_s, [each.refused for each in begun]
     scenes += [each.accepted for each in begun]
     goal, settled = np.array([each.goal for each in begun] * 2), np.array([each.settled for each in begun] * 2)
     loops, lasting = stacked(scenes), np.array([len(one.executed) for one in scenes])
-    way, done = _followed(trace, loops, goal, settled, lasting, nudge)
+    way, done = _followed(trace, loops, goal, settled, lasting)
     away = np.square(loops.preset.swapaxes(0, 1)[1 : len(way)] - way[1:]).sum(axis=2)
     integral = np.concatenate([np.zeros((1, away.shape[1])), np.cumsum(h * away, axis=0)])
     found = [
@@ -68,22 +59,11 @@ def _rolled_out(
     return list(zip(found[: len(begun)], found[len(begun) :], strict=True))
 
 
-def _followed(
-    trace: Trace, loops: Scene, goal: Array, settled: Counts, lasting: Counts, nudge: Array | float
-) -> tuple[Array, Counts]:
-    """Where R closed loops lead, (T + 1, R, 3), m, and the period after which each ends, (R,); T is the last.
-
-    Args:
-        trace: the run.
-        loops: stacked.
-        goal: (R, 3), m.
-        settled: periods after which each may end, once it is at rest, (R,).
-        lasting: periods after which each ends, (R,).
-        nudge: as of `roll_out`.
-    """
+def _followed(trace: Trace, loops: Scene, goal: Array, settled: Counts, lasting: Counts) -> tuple[Array, Counts]:
+    """Where R closed loops lead, (T + 1, R, 3), m, and the period after which each ends, (R,); T is the last."""
     second = max(1, round(1.0 / trace.scenario.control.period_s))
     ways, done, still = [loops.here], lasting, np.minimum(STILL_M, loops.limit / 10.0)
-    for k, place in enumerate(roll_out(trace, loops, nudge)):
+    for k, place in enumerate(roll_out(trace, loops)):
         ways.append(place)
         if k < settled.min():
             continue
@@ -99,7 +79,7 @@ def _followed(
 def _concluded(scenario: Scenario, begun: Beginning, places: Array, integral: float) -> Foreseen:
     end = places[-1]
     if np.linalg.norm(end - begun.goal) <= scenario.arrival_tolerance_m:
-        return Foreseen(places, False, integral, 0.0, 0.0)
+        return Foreseen(False, integral, 0.0, 0.0)
     before = places[max(0, len(places) - 1 - max(1, round(1.0 / scenario.control.period_s)))]
     stalls = bool(np.linalg.norm(end - before) < min(STILL_M, float(begun.refused.limit) / 10.0))
-    return Foreseen(places, stalls, integral, *bounds_of_way_left(end, begun.goal, *begun.known))
+    return Foreseen(stalls, integral, *bounds_of_way_left(end, begun.goal, *begun.known))

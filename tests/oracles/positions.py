@@ -18,7 +18,6 @@ Flags = npt.NDArray[np.bool_]
 
 
 def loses(trace: Trace) -> bool:
-    """Whether positions may be lost between the UGVs of a run."""
     links = trace.scenario.ugv_links
     return links is not None and links.loss > 0.0 and not acts_on_old(trace)
 
@@ -68,7 +67,6 @@ def old_positions(trace: Trace, ugv: str) -> tuple[Array, Array]:
 
 
 def unheard(trace: Trace, ugv: str) -> Flags:
-    """Whether a UGV lacks the message of each robot at the control samples, (S, r)."""
     t, lacks = trace.sampled("t_s"), np.zeros((len(trace.sample_rows), len(trace.robots)), dtype=np.bool_)
     for k, other in enumerate(trace.ugvs if loses(trace) and ugv in trace.ugvs else ()):
         if other != ugv:

@@ -26,18 +26,7 @@ rounding."""
 def closest(
     wanted: Array, normal: Array, bound: Array, contradiction: float = CONTRADICTION_M_S
 ) -> tuple[Array, Flags]:
-    """argmin ||v - wanted||^2 with normal_k.v >= bound_k for all k, for B samples, in 1 to 3 dimensions d.
-
-    Args:
-        wanted: (B, d), m/s.
-        normal: (B, K, d), of any length.
-        bound: (B, K), m/s; -inf where nothing is asked.
-        contradiction: inequalities contradict each other if every velocity misses one by more than this, m/s.
-
-    Returns:
-        Velocities (B, d), m/s, and whether the inequalities of a sample can be met, (B,); if not, its velocity means
-        nothing.
-    """
+    """argmin ||v - wanted||^2 with normal_k.v >= bound_k for all k, for B samples, in 1 to 3 dimensions d."""
     length = np.linalg.norm(normal, axis=2)
     flat = length <= PARALLEL
     possible = ~(flat & (bound > contradiction)).any(axis=1)
@@ -67,7 +56,6 @@ def _on_boundary(wanted: Array, unit: Array, level: Array, contradiction: float)
 
 
 def _complement(facing: Array) -> Array:
-    """Orthonormal vectors (B, d - 1, d) orthogonal to unit vectors (B, d)."""
     if facing.shape[1] == 2:
         return np.stack([-facing[:, 1], facing[:, 0]], axis=1)[:, None]
     axis = np.eye(3)[np.argmin(np.abs(facing), axis=1)]

@@ -23,7 +23,6 @@ class Answer(NamedTuple):
 
     @property
     def refused(self) -> bool:
-        """Whether it withdraws the proposal, and all other parts of its joint plan."""
         return not (self.accepted or self.done)
 
 
@@ -115,7 +114,6 @@ def lost_s(trace: Trace, sent: ProposalRecord) -> float:
 
 
 def parts_of(trace: Trace, sent: ProposalRecord) -> list[ProposalRecord]:
-    """The other parts of the joint plan that a proposal is part of."""
     same = (sent.issued_s, sent.party)
     return [one for one in proposals_of(trace) if sent.party and one is not sent and (one.issued_s, one.party) == same]
 
@@ -153,7 +151,6 @@ def _in_force(trace: Trace, sent: ProposalRecord, now: float) -> bool:
 
 
 def _is_accepted(trace: Trace, sent: ProposalRecord, now: float) -> bool:
-    """Whether a proposal in force is accepted at `now`, s."""
     if trace.meta["method"] not in GATED_METHODS:
         return True
     own = _answer_at(trace, sent, now)
@@ -170,7 +167,6 @@ def _answer_at(trace: Trace, sent: ProposalRecord, now: float) -> Answer | None:
 
 
 def answers_to(trace: Trace, sent: ProposalRecord) -> list[Answer]:
-    """Every decision about a proposal, by time."""
     return trace.derived("answers_to", lambda: _answers(trace)).get(sent.number, [])
 
 

@@ -30,7 +30,6 @@ def still_parts(trace: Trace) -> Parts:
 
 
 def are_there(trace: Trace, t: float | Array) -> npt.NDArray[np.bool_]:
-    """Which of these parts are there at a time, (m,), or at (m,) times, s."""
     still, times = carried(trace)[0][0], np.append(trace.t, np.inf)
     first, last = (times[rows[still]] for rows in lifetimes(trace))
     return np.asarray((first <= t + TIME_TOLERANCE_S) & (t < last - TIME_TOLERANCE_S))
@@ -74,20 +73,11 @@ def beyond_range(trace: Trace, ugv: str, t: float) -> Array:
 
 
 def moves(trace: Trace, robot: str, t: float) -> tuple[Array, Array]:
-    """Where a robot is at a time, (3,), m, and its velocity up to then, (3,), m/s."""
     return place_of(trace, robot, t), trace.command(robot)[row_at(trace, t)]
 
 
 def news(trace: Trace, ugv: str, mapped: Array, begin_s: float, end_s: float) -> Indices:
-    """Parts that a UGV senses for the first time within (begin_s, end_s], and that are not on a proposal's map.
-
-    Args:
-        trace: the run.
-        ugv: the UGV.
-        mapped: outlines of the map, (k, W).
-        begin_s: s.
-        end_s: s.
-    """
+    """Parts that a UGV senses for the first time within (begin_s, end_s], and that are not on a proposal's map."""
     first = trace.derived(("first sensed", ugv), lambda: first_sensed(trace, ugv))
     new = (first > begin_s + TIME_TOLERANCE_S) & (first <= end_s + TIME_TOLERANCE_S)
     shown = are_same(still_parts(trace).cores, Cores.of(mapped)).any(axis=1)
@@ -95,7 +85,6 @@ def news(trace: Trace, ugv: str, mapped: Array, begin_s: float, end_s: float) ->
 
 
 def are_same(one: Cores, other: Cores) -> npt.NDArray[np.bool_]:
-    """Which cores (m,) are which others (k,), up to `SAME_M`: (m, k)."""
     both = Cores.joined([one, other])
     numbers = np.column_stack([both.corners.reshape(len(both.base), 2 * both.corners.shape[1]), both.base, both.top])
     m = len(one.base)

@@ -51,7 +51,6 @@ def test_an_honest_run_has_no_faults(base: Base, name: str) -> None:
 
 
 def without_point(trace: Trace) -> Trace:
-    """The decision forgets the nearest obstacle."""
     row = rows_of(trace)[SIXTH]
     j = int(np.argmin(np.linalg.norm(row["initial_m"] - row["centres_m"][0], axis=1) - row["distances_m"]))
     m = len(row["distances_m"])
@@ -68,8 +67,6 @@ def budget_spent(row: dict[str, Any], given: dict[str, Any]) -> None:
 
 
 def other_plan(choose: Callable[[GateData], Any], *, bounded: bool) -> Edit:
-    """A consistent record of another plan; `bounded`: it is said to be the optimum."""
-
     def edit(trace: Trace) -> Trace:
         data = GateData.of(rows_of(trace)[SIXTH])
         plan = choose(data)
@@ -93,7 +90,6 @@ def beside_the_best(data: GateData) -> Any:
 
 
 def undecided(trace: Trace) -> Trace:
-    """Nothing is decided on the first proposal."""
     silent = (trace.decisions["issued_s"] != trace.decisions["issued_s"].min()).to_numpy()
     left = replace(trace, decisions=trace.decisions[silent])
     return replace(left, problems=trace.problems[silent]) if len(trace.problems) else left
@@ -154,13 +150,10 @@ def test_an_edited_record_has_faults(base: Base, name: str, edit: Edit, shown: s
 
 
 def changed(name: str, index: Any, *, factor: bool = False) -> Callable[[Trace, float], Trace]:
-    """A number of the last decision's problem, moved by so much."""
     return lambda trace, by: problem(LAST, **{name: at(index, lambda v: v * (1.0 + by) if factor else v + by)})(trace)
 
 
 def moved(name: str) -> Callable[[Trace, float], Trace]:
-    """A number of the last decision, moved by so much."""
-
     def edit(trace: Trace, by: float) -> Trace:
         decisions = trace.decisions.copy()
         decisions.loc[len(decisions) - 1, name] += by
@@ -170,8 +163,6 @@ def moved(name: str) -> Callable[[Trace, float], Trace]:
 
 
 def with_bound(worked_out: Callable[[Bounded, float], float]) -> Edit:
-    """Another lower bound, and the gap that goes with it."""
-
     def edit(trace: Trace, by: float) -> Trace:
         row = rows_of(trace)[LAST]
         (bounded,) = bound([row], 0)

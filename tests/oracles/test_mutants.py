@@ -21,14 +21,11 @@ from oracles.mutants import (
     LateByASample,
     NoRest,
     executed,
-    executed_whatever_the_answer,
     formation_gain,
     gain,
     moved_map,
     no_feed_forward,
     no_limit_of,
-    not_sent,
-    not_withdrawn,
     selection_ignored,
     sent_with,
     ugv2_avoids_nothing,
@@ -39,12 +36,10 @@ pytestmark = pytest.mark.slow  # each simulates a run of its own
 
 
 def found(oracle: str, run: str = "d", scenario: str = "case_b", given: Sequence[str] = ()) -> list[Fault]:
-    """The faults that an oracle finds in a new run."""
     return ORACLES[oracle](simulate(load(scenario, list(given)), run))
 
 
 COMMANDS: dict[str, tuple[Patch, str, list[str], str]] = {
-    "executed whatever the answer": (executed_whatever_the_answer, "d", [], "ugv"),
     "intervention gain": (gain("intervention_gain", 1.2), "d", [], "ugv"),
     "intervention gain, on top": (gain("intervention_gain", 1.2), "c", [], "ugv"),
     "intervention gain, no gatekeeper": (gain("intervention_gain", 1.2), "b", [], "ugv"),
@@ -67,9 +62,6 @@ def test_other_commands_are_noticed(name: str, monkeypatch: pytest.MonkeyPatch) 
 
 
 PROTOCOL: dict[str, tuple[Patch, str, str]] = {
-    "answers not sent": (not_sent, "protocol", "executes another proposal"),
-    "not withdrawn after a release": (not_withdrawn, "protocol", "executes another proposal"),
-    "decided on after that": (not_withdrawn, "protocol", "decision on what was withdrawn"),
     "executed late": (executed(lambda before, now: before[0]), "protocol", "executes another proposal"),
     "executed for ever": (
         executed(lambda before, now: [a or b for a, b in zip(now, before[1], strict=True)]),
@@ -83,8 +75,7 @@ PROTOCOL: dict[str, tuple[Patch, str, str]] = {
 def test_another_protocol_is_noticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     patch, oracle, what = PROTOCOL[name]
     patch(monkeypatch)
-    scenario = "case_a" if patch is not_sent else "case_b"  # the first proposal is accepted, or refused
-    assert any(fault.what.startswith(what) for fault in found(oracle, scenario=scenario))
+    assert any(fault.what.startswith(what) for fault in found(oracle))
 
 
 PREDICTIONS: dict[str, Callable[[ClosedLoop], ClosedLoop]] = {

@@ -23,7 +23,6 @@ CODES = {
 def both(
     wanted: Array, normal: Array, bound: Array, composition: str = "augmented", planar: bool = True
 ) -> tuple[Array, Array]:
-    """Velocities by the oracle and by the kernel."""
     ours = avoiding(wanted, Inequalities(normal, bound), composition, planar=planar)
     running = [kernels.avoid_one(*one, CODES[composition]) for one in zip(wanted, normal, bound, strict=True)]
     return ours, np.array(running)
@@ -44,7 +43,6 @@ def drawn(seed: int, planar: bool, *, demanding: bool = False) -> tuple[Array, A
 
 
 def around(rng: np.random.Generator, *angles: float | Array) -> Array:
-    """Unit vectors (B, K, 3) in the plane at these angles, rad, to one at random."""
     base = rng.uniform(0.0, 2.0 * np.pi, size=BATCH)
     towards = np.stack([base + angle for angle in angles], axis=1)
     return np.stack([np.cos(towards), np.sin(towards), np.zeros_like(towards)], axis=2)
@@ -84,57 +82,6 @@ def test_two_algorithms_agree(seed: int, planar: bool, demanding: bool) -> None:
 def test_recursion_as_printed_agrees(composition: str, seed: int) -> None:
     ours, running = both(*drawn(seed, planar=True), composition)
     assert ours == pytest.approx(running, abs=1e-12)
-
-
-@given(SEEDS, st.booleans(), st.sampled_from([1e-2, 1e-3, 1e-4]), st.sampled_from([1e-7, 1e-4, 1.0]))
-def test_nearly_parallel_inequalities(seed: int, planar: bool, angle: float, demand: float) -> None:
-    """A robot behind another, both ahead: where their inequalities meet, not where one meets that of a far obstacle."""
-    rng = np.random.default_rng(seed)
-    ahead = rng.normal(size=(BATCH, 1, 3)) * [1.0, 1.0, float(not planar)]
-    ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
-    normal = ahead + angle * rng.normal(size=(BATCH, 5, 3))
-    normal[:, 3:] = rng.normal(size=(BATCH, 2, 3))
-    normal *= [1.0, 1.0, float(not planar)]
-    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-    bound = demand * rng.normal(size=(BATCH, 5))
-    bound[:, 3:] = -rng.uniform(50.0, 500.0, size=(BATCH, 2))
-    ours, running = both(-3.0 * ahead[:, 0], normal, bound, planar=planar)
-    allowed = 1e-6 * np.maximum(1.0, np.linalg.norm(ours, axis=1, keepdims=True))
-    assert (np.abs(running - ours) <= allowed).all()
-
-
-@given(SEEDS, st.sampled_from([1e-3, 1e-5, 1e-7, 1e-9]), st.sampled_from([0.0, 1e-10, 1e-8]))
-def test_a_robot_squeezed_between_two_goes_to_the_same_corner(seed: int, angle: float, gap: float) -> None:
-    """Between an obstacle and another robot, nearly opposite: what each bound is kept by decides where they meet."""
-    rng = np.random.default_rng(seed)
-    aside = angle * rng.uniform(0.5, 1.5, size=BATCH) * rng.choice([-1.0, 1.0], size=BATCH)
-    bound = -gap * rng.uniform(0.1, 1.0, size=(BATCH, 3))
-    bound[:, 2] = -50.0
-    ours, running = both(2.0 * rng.normal(size=(BATCH, 3)) * [1, 1, 0], around(rng, 0.0, np.pi + aside, 1.0), bound)
-    assert ours == pytest.approx(running, abs=1e-6)
-
-
-@given(SEEDS, st.sampled_from([1e-8, 1e-6, 1e-4]))
-def test_between_two_that_both_push_rounding_makes_no_speed(seed: int, demand: float) -> None:
-    """Opposite directions but for rounding: along both boundaries it is 16 m/s to that of a far obstacle."""
-    rng = np.random.default_rng(seed)
-    normal = around(rng, 0.0, np.pi + 10.0 ** rng.uniform(-17.0, -15.0, size=BATCH), 2.0, -2.5)
-    bound = np.hstack([demand * rng.uniform(0.1, 1.0, size=(BATCH, 2)), np.full((BATCH, 2), [-16.0, -30.0])])
-    ours, running = both(2.0 * rng.normal(size=(BATCH, 3)) * [1, 1, 0], normal, bound)
-    assert (np.linalg.norm(running, axis=1) <= demand).all()
-    assert ours == pytest.approx(running, abs=1e-10)
-
-
-@given(SEEDS)
-def test_in_contact_rounding_decides_nothing(seed: int) -> None:
-    """A robot at the safe distance of one, and inside that of another behind it: on which side rounding puts it."""
-    rng = np.random.default_rng(seed)
-    touches = np.array([0.0, -1e-15, 1e-15, -1e-12, 1e-12, 0.0])
-    normal = np.tile(around(rng, 0.0, np.pi + rng.uniform(-0.2, 0.2), rng.uniform(1.0, 2.0))[:1], (BATCH, 1, 1))
-    wanted = np.tile(3.0 * rng.normal(size=3) * [1.0, 1.0, 0.0], (BATCH, 1))
-    bound = np.column_stack([touches, np.full(BATCH, rng.uniform(0.1, 2.0)), np.full(BATCH, rng.uniform(-1.0, 0.0))])
-    for found in both(wanted, normal, bound):
-        assert found[1:] == pytest.approx(np.tile(found[0], (BATCH - 1, 1)), abs=1e-9)
 
 
 @given(SEEDS)

@@ -48,14 +48,12 @@ Base = Callable[[str], Trace]
 
 
 def each_value(**changes: Callable[[Any], Any]) -> Edit:
-    """Every value of a column of the proposals."""
     return proposals(
         lambda table: table.assign(**{k: [f(np.asarray(v)) for v in table[k]] for k, f in changes.items()})
     )
 
 
 def packed(outlines: Array) -> list[float]:
-    """Outlines as they stand in a table."""
     return [number for row in outlines for number in outline.as_tuple(row)]
 
 
@@ -73,8 +71,6 @@ def told(row: int, some: slice = slice(None), by: float = 0.0, wider: float = 0.
 
 
 def with_proposal(**changes: Any) -> Edit:
-    """The last proposal once more, and its event."""
-
     def edit(trace: Trace) -> Trace:
         more = trace.proposals.iloc[[-1]].assign(number=90, **changes)
         event = {"t_s": float(more["issued_s"].iloc[0]), "robot": more["robot"].iloc[0], "kind": "proposal",
@@ -90,7 +86,6 @@ def sent_again(trace: Trace) -> Trace:
 
 
 def part_lost(trace: Trace) -> Trace:
-    """A part of a joint plan was not sent."""
     gone = trace.proposals.iloc[int(np.argmax([len(party) for party in trace.proposals["party"]]))]
     assert len(gone["party"]) > 1
     of = ("proposal", gone["robot"], float(gone["issued_s"]))
@@ -104,8 +99,6 @@ def every_decision(**values: Any) -> Edit:
 
 
 def one_more(where: Callable[[pd.DataFrame], Any], later_s: float) -> Edit:
-    """The last decision of some, once more, so much later."""
-
     def edit(trace: Trace) -> Trace:
         row = trace.decisions[where(trace.decisions)].iloc[[-1]]
         later = row.assign(t_s=row["t_s"] + later_s)
@@ -115,7 +108,6 @@ def one_more(where: Callable[[pd.DataFrame], Any], later_s: float) -> Edit:
 
 
 def cut_short(trace: Trace) -> Trace:
-    """The decisions on an accepted proposal stop while it is in force."""
     last = int(np.flatnonzero(executing(trace.decisions))[-1])
     return replace(trace, decisions=trace.decisions.iloc[: last - 3])
 
@@ -125,7 +117,6 @@ def messages(edit: Callable[[pd.DataFrame], pd.DataFrame]) -> Edit:
 
 
 def later(kind: str, by_s: float) -> Edit:
-    """Messages of a kind are sent later."""
     return messages(lambda table: table.assign(sent_s=table["sent_s"] + by_s * (table["kind"] == kind)))
 
 
@@ -193,7 +184,6 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
 
 
 def acting(trace: Trace) -> int:
-    """A control sample at which ugv1 executes a proposal."""
     return int(np.flatnonzero(trace.sampled("ugv1.executing") >= 0.0)[3])
 
 

@@ -14,7 +14,6 @@ OUTSIDE_M_S = 1e-12
 
 
 def numbers_of(trace: Trace, ugv: str) -> Array:
-    """These numbers of a UGV, (5,)."""
     for plant in trace.scenario.ugvs[ugv].plant:
         if plant.kind == "unicycle":
             turn, wheel = plant.max_turn_rad_s or np.inf, plant.max_wheel_speed_m_s or np.inf

@@ -93,6 +93,5 @@ def _passes(start: Array, end: Array, core: Cores, radius: float) -> Flags:
 
 
 def _side(a: Array, b: Array, c: Array) -> Array:
-    """Positive where c is left of the line from a to b."""
     (ax, ay), (bx, by), (cx, cy) = ((each[..., 0], each[..., 1]) for each in (a, b, c))
     return np.asarray((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))

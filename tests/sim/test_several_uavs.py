@@ -97,7 +97,7 @@ def test_a_uav_alone_that_is_lost_helps_nobody_any_more(run: Run) -> None:
     assert not faults_of(trace)
 
 
-@pytest.mark.parametrize("method", ["b", "c"])
+@pytest.mark.parametrize("method", ["b", pytest.param("c", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("lost_at_s", [8.23, 12.0])
 def test_other_methods_forget_what_a_lost_uav_asked_at_its_end_too(method: str, lost_at_s: float) -> None:
     over = {"runs": {method: {"method": method}}, "uavs.south.lost_at_s": lost_at_s, "duration_s": 20.0}

@@ -152,7 +152,7 @@ def test_a_trace_survives_saving_and_a_changed_file_does_not(run: Runs, tmp_path
         trace.load(tmp_path)
 
 
-@pytest.mark.parametrize(("period", "noise_period"), [(0.01, 0.05), (0.05, 0.01), (0.025, 0.05)])
+@pytest.mark.parametrize(("period", "noise_period"), [pytest.param(0.01, 0.05, marks=pytest.mark.slow), (0.05, 0.01)])
 def test_claims_do_not_depend_on_the_periods(case_a: Scenario, period: float, noise_period: float) -> None:
     """Periods that are not binary fractions give steps of 1e-17 s; event times may coincide with samples."""
     case_a.control.period_s, case_a.decision.noise_period_s = period, noise_period

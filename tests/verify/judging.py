@@ -14,8 +14,6 @@ from airground_drake.verify.claim import ModelClaim
 
 
 class Judged(Protocol):
-    """The type of the fixture `judged` of conftest.py."""
-
     def __call__(self, claim: ModelClaim, inputs: dict[str, Any] | None = None) -> Finding:
         """The finding for these inputs; default: those of case A."""
 
@@ -33,7 +31,6 @@ UNRECORDED = {
 
 
 def decided(claim: str, trace: Trace) -> Finding:
-    """One claim on one trace."""
     return CLAIMS[claim].judge(trace)
 
 

@@ -19,7 +19,6 @@ SHORT = ["duration_s=17.33", "reproduction=[]"]
 
 
 def compared(scenario: Scenario, run: str, seeds: range = range(1)) -> set[str]:
-    """The claims with findings."""
     loop, screened = Batch(scenario, run), set[str]()
     for seed in seeds:
         made = loop.made(seed)
@@ -56,20 +55,17 @@ def log(loop: Batch) -> Log:
 
 
 def moved(log: Log) -> Log:
-    """The UAV jumps."""
     log.bodies[200:, 6] += 1e-6
     return log
 
 
 def overtaken(log: Log) -> Log:
-    """A robot is taken through an obstacle, as its commands say."""
     log.bodies[:, 3], log.bodies[:, 4] = 4.0 + 0.5 * (log.t - 8.0), 7.0
     log.command[:, 3:5] = [0.5, 0.0]
     return log
 
 
 def late(log: Log) -> Log:
-    """The trigger is isolated 2e-5 s late."""
     row = int(np.flatnonzero(log.status[:, 0])[0]) - 1
     by = 2e-5 / (log.t[row + 1] - log.t[row])
     for column in log[1:]:
@@ -81,7 +77,6 @@ def late(log: Log) -> Log:
 
 
 def missed(log: Log) -> Log:
-    """The trigger does not happen."""
     log.status[:, :4] = log.status[0, :4]
     return log
 

@@ -26,8 +26,6 @@ FOUND = Finding("proved", margin=2.0, exercised=1, evidence=Noted({"a": [1.0]}))
 
 
 class Counting(ModelClaim):
-    """A claim that counts how often it is decided."""
-
     id, statement, formula, method, equations = "THR-DDM", "s", "f", "m", "e"
     assumptions, does_not_establish, record, kept = (), "n", Noted, True
 

@@ -1,10 +1,7 @@
 """How often a claim was put to the test: counted by every claim, 0 where nothing tested it, demanded by scenarios."""
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
-from html import unescape
-from pathlib import Path
 from typing import Any
 
 import persons
@@ -17,7 +14,6 @@ from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import Finding, judge
-from airground_drake.verify.__main__ import main
 from airground_drake.verify.claim import Verdict, well_formed
 
 IDLE = [
@@ -61,7 +57,6 @@ def test_a_run_with_several_triggers_and_proposals_exercises_every_claim(
 
 
 def without_messages(trace: Trace) -> Trace:
-    """The same triggers, but the UAV has sent nothing."""
     tables = {name: getattr(trace, name).iloc[:0] for name in ("decisions", "problems", "proposals")}
     kept = [event for event in trace.events if event["kind"] not in ("proposal", "accept", "refuse")]
     idle = with_samples(trace, lambda samples: samples.assign(**{f"{ugv}.executing": -1.0 for ugv in trace.ugvs}))
@@ -118,29 +113,3 @@ def test_an_expectation_that_admits_either_verdict_expects_nothing() -> None:
         assert run.expected["LIVE-GOAL"] == NOTHING
     for expected in ("holds", "refuted", "holds or supported", "refuted or error"):
         assert declared(expected) == expected
-
-
-def test_report_and_command_line_say_what_was_not_exercised_and_what_a_margin_is_of(
-    report: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = report("case_b")
-    document = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    overall, claims = document["overall"], document["claims"]
-    assert overall["not_exercised"] == [
-        *({"id": "ZENO-TRACE", "run": run} for run in ("b", "c", "c_literal", "d")),
-        {"id": "THR-CHOICE", "run": ""},  # its threshold is declared
-    ]
-    assert overall["counts"]["not_exercised"] == 5
-    assert overall["counts"]["holds"] == sum(claim["status"] == "holds" for claim in claims) - 5
-    assert all(claim["exercised"] is not None for claim in claims)
-    page = unescape((folder / "report.html").read_text(encoding="utf-8"))
-    for claim in claims:
-        if claim["margin"] is not None:
-            assert len(claim["quantity"].split()) >= 3
-            assert claim["quantity"] in page
-    capsys.readouterr()  # what making the report has printed
-    assert main([str(folder / "trace" / "d"), "ZENO-TRACE", "SAFE-TRACE"]) == 0
-    safe, zeno = capsys.readouterr().out.splitlines()
-    assert zeno.startswith("ZENO-TRACE d: holds, nothing to check [0 ")
-    quantity = next(each["quantity"] for each in claims if (each["id"], each["run"]) == ("SAFE-TRACE", "d"))
-    assert f"m ({quantity})" in safe

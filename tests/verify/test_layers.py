@@ -40,7 +40,6 @@ DATA = {"model.geometry.motion"}
 
 
 def modules(folder: str) -> Iterator[Path]:
-    """The files of a folder of verify/ with the claims that belong to it: `runs`, `model` or `engines`."""
     yield from (PACKAGE / "verify" / folder).rglob("*.py")
     for path in (PACKAGE / "verify" / "claims").rglob("*.py"):
         about = "runs" if f"verify.claims.{path.stem}" in ABOUT_RUNS else "model"

@@ -30,7 +30,6 @@ def core_of(row: Array) -> Cores:
 
 
 def corners_of(row: Array) -> Array:
-    """All corners of a core in space, (2 n, 3), m."""
     flat = row[9 : 9 + 2 * int(row[5])].reshape(-1, 2)
     return np.array([[*corner, height] for corner in flat for height in row[3:5]])
 
@@ -93,24 +92,6 @@ def test_the_least_distance_along_a_motion_against_sampling(seed: int, planar: b
     sampled = away_from(core, start + fine[:, None] * (end - start), planar=planar).distance.min()
     assert sampled - length / 800.0 <= least <= sampled + 1e-12
     assert away_from(core, start + share * (end - start), planar=planar).distance == pytest.approx(least, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("begin", "end", "least", "share"),
-    [
-        ((-2.0, 0.5), (3.0, 0.5), -0.5, 0.3),  # through the square, deepest in its middle metre
-        ((-2.0, 0.5), (-2.0, 0.5), 1.0, 0.0),  # stands still
-        ((-2.5, 0.5), (-0.5, 2.5), 0.5**0.5, 0.5),  # past a corner
-        ((-3.0, 1.25), (3.0, 1.25), 0.25, 1.0 / 3.0),  # along an edge: the earliest place
-        ((0.0, 3.0), (0.0, 1.5), 0.5, 1.0),
-    ],
-)
-def test_motions_past_a_square(
-    begin: tuple[float, float], end: tuple[float, float], least: float, share: float
-) -> None:
-    square = core_of(outline.prism([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], top=1.0))
-    found = least_distances(square, np.array([[*begin, 0.0]]), np.array([[*end, 0.0]]), planar=True)
-    assert (found[0][0], found[1][0]) == (pytest.approx(least, abs=1e-15), pytest.approx(share))
 
 
 def test_the_way_out_through_the_top_is_for_those_who_fly() -> None:

@@ -140,29 +140,6 @@ ROUNDING_M = 2e-14
 """Some roundings of coordinates of 10 m, each by 9e-16 m."""
 
 
-@given(seed=st.integers(0, 2**32 - 1), ugvs=st.integers(1, 4), rocks=st.integers(0, 4))
-def test_teams_under_the_running_law_miss_no_more_than_rounding(seed: int, ugvs: int, rocks: int) -> None:
-    """Whatever is asked of them: each sample of a team that starts safe meets its inequalities."""
-    rng, h = np.random.default_rng(seed), 0.05
-    grid = rng.permutation([[2.5 * x, 2.5 * y, 0.0] for x in range(4) for y in range(4)])
-    starts = np.concatenate([grid[:ugvs], grid[ugvs : ugvs + 1] + np.array([0.0, 0.0, 1.0])])
-    obstacles = grid[ugvs + 1 : ugvs + 1 + rocks]
-    team = world(ugvs, obstacles, 2.0, 1.5, 1.0, max_speed=rng.uniform(0.5, 5.0, ugvs + 1).tolist())
-    avoidance = Avoidance(gain=float(rng.uniform(1.0, 20.0)), period=h, sensing_range=4.0)
-    near, rows = team.around(slice(0, ugvs + 1)), [starts]
-    for _ in range(30):
-        wish = rng.normal(0.0, 5.0, starts.shape) * near.mobility
-        rows.append(rows[-1] + h * avoidance.command(wish, rows[-1], near))
-    paths = np.stack(rows, axis=1)
-    gain = Fraction(avoidance.gain) * Fraction(h)
-    for i, path in enumerate(paths):
-        for rock in obstacles:
-            assert shortfalls(path, rock, 2.0, ONE, gain, ONE).max() <= ROUNDING_M
-        for j in range(i):
-            d = 1.0 if i == ugvs else 1.5
-            assert shortfalls(path, paths[j], d, HALF, gain, ONE).max() <= ROUNDING_M
-
-
 @given(seed=st.integers(0, 2**32 - 1), planar=st.booleans())
 def test_the_running_law_beside_a_core_misses_no_more_than_rounding(seed: int, planar: bool) -> None:
     """From outside and from inside, whatever is asked of it."""

@@ -23,8 +23,6 @@ def coq_version() -> str:
 
 @pytest.fixture(scope="session")
 def compiled(shared: Path, coq_version: str) -> Path:
-    """A folder with all theories, compiled; not to be changed."""
-
     def make(folder: Path) -> None:
         folder.mkdir()
         coq.install(dict.fromkeys(map(file_of, THEOREMS)), folder)
@@ -34,7 +32,6 @@ def compiled(shared: Path, coq_version: str) -> Path:
 
 @pytest.fixture
 def workshop(compiled: Path, coq_version: str, tmp_path: Path) -> Workshop:
-    """A folder of the test's own, in which the checkers are compiled."""
     folder = tmp_path / "workshop"
     shutil.copytree(compiled, folder)
     return Workshop(folder, coq_version, {path.name: digest(FOLDER / path.name) for path in folder.glob("*.v")})

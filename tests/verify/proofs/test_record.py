@@ -17,7 +17,6 @@ from airground_drake.verify.proofs.record import FOLDER, file_of, read_record
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """The theories with their record, to be changed at will."""
     folder = tmp_path / "proofs"
     shutil.copytree(FOLDER, folder, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     return folder

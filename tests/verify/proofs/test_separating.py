@@ -23,7 +23,6 @@ def parts(*places: tuple[float, ...]) -> list[Vector]:
 
 @st.composite
 def prisms(draw: st.DrawFn) -> Prism:
-    """Posts, walls, triangles and boxes, flat or not."""
     x, y, a, b = (draw(st.integers(-3 * M, 3 * M)) for _ in range(4))
     a, b = a or M, b or M
     turns = (0, 1, 2, 3)[: draw(st.integers(1, 4))]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from builders.decisions import STAGES
-from builders.edits import first_of, with_decision, with_meta, with_samples, with_scenario, with_states
+from builders.edits import first_of, with_decision, with_meta, with_samples, with_scenario
 from builders.runs import beside_a_rock, chattering, dead_end, leaking, refractory, run_of
 
 from airground_drake.sim.trace import Trace
@@ -35,10 +35,6 @@ def meta(**changes: Any) -> Edit:
     return lambda trace: with_meta(trace, **changes)
 
 
-def signals(**columns: Any) -> Edit:
-    return lambda trace: with_states(trace, lambda table: table.assign(**columns))
-
-
 def sampled(**columns: Any) -> Edit:
     return lambda trace: with_samples(trace, lambda table: table.assign(**columns))
 
@@ -61,12 +57,10 @@ def proposals(edit: Callable[[pd.DataFrame], pd.DataFrame]) -> Edit:
 
 
 def one_more(**columns: Any) -> Edit:
-    """The last decision once more, with other values in some columns."""
     return decisions(lambda table: pd.concat([table, table.iloc[[-1]].assign(**columns)], ignore_index=True))
 
 
 def proposed(*times: float, robot: str = "ugv1") -> Edit:
-    """More events of proposals."""
     return events(lambda all_: all_.extend([{**first_of(all_, "proposal"), "t_s": t, "robot": robot} for t in times]))
 
 
@@ -95,12 +89,10 @@ def first(where: Callable[[pd.DataFrame], Any], **values: Any) -> Edit:
 
 
 def decision(edit: Callable[[dict[str, Any], dict[str, Any]], object], row: int = SIXTH) -> Edit:
-    """A decision, as its columns and its problem."""
     return lambda trace: with_decision(trace, edit, row)
 
 
 def problem(row: int = SIXTH, **arrays: Callable[[Any], Any]) -> Edit:
-    """Numbers of a decision's problem."""
     return decision(lambda _, given: given.update({k: change(given[k]) for k, change in arrays.items()}), row)
 
 
@@ -121,8 +113,6 @@ def kept(*numbers: int) -> Edit:
 
 
 def at(index: Any, value: Any) -> Callable[[Any], Any]:
-    """A number of an array, set or called with what is there."""
-
     def change(values: Any) -> Any:
         values = np.array(values, dtype=float)
         values[index] = value(values[index]) if callable(value) else value

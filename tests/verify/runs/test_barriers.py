@@ -1,22 +1,15 @@
 """Claims about runs beside walls, polygons and prisms: distances that can be worked out by hand."""
 
-from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from builders.misbuilt import Patch
-from builders.rooms import NOTCHED, SQUARE, room
+from builders.rooms import NOTCHED, SQUARE
 from builders.scenarios import STILL, lone
 from builders.simulation import simulate
 from verify.judging import decided
 
-from airground_drake.base.arrays import Array
-from airground_drake.model.geometry import outline
-from airground_drake.scenario import world
-from airground_drake.scenario.schema import Obstacle, Policy, SafeDistance
-from airground_drake.sim.simulation import simulate as simulated
+from airground_drake.scenario.schema import Obstacle, SafeDistance
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.gate_plan import INSIDE_M
 from airground_drake.verify.pair_kinds import constants
@@ -114,89 +107,8 @@ def test_a_wall_that_appears_is_judged_from_then_on() -> None:
     assert "appeared at 0.5 s" in on_top.counterexample["why"]
 
 
-@pytest.mark.parametrize("step_m", [0.0, 0.015])
-def test_a_step_into_a_wall_costs_what_the_theorem_says(step_m: float) -> None:
-    """A h = 0.075. The part that is stepped into is the second one of the wall."""
-    scenario = lone(
-        [-2.0, 1.0, 0.0],
-        [-2.0, 1.0, 0.0],
-        STILL,
-        3.0,
-        obstacles={"o": Obstacle(segment_m=[[-4, 3.01], [0, 3.01], [0, -4]])},
-    )
-    trace = simulate(scenario, drive=lambda t: [[step_m / 0.025 * (round(t / 0.025) == 7), 0.0, 0.0], [0.0] * 3])
-    finding = decided("SAFE-HYP", trace)
-    (pair,) = finding.evidence["pairs"]
-    assert (pair["first"], pair["second"]) == ("ugv1", "o")
-    assert (pair["e_m"], pair["guarantee_m"]) == (
-        pytest.approx(step_m, abs=1e-15), pytest.approx(2.0 - step_m / 0.075, abs=1e-12),
-    )  # fmt: skip
-    assert finding.status == ("holds" if step_m == 0.0 else "refuted")
-    assert finding.evidence["inequalities_that_bind"]["ugv beside obstacle"] > 0
-
-
 def test_too_near_is_the_nearest_part_at_the_time() -> None:
     trace = passing((5.0, 5.0), (5.0, 5.0), 0.1, polygon_m=NOTCHED, appears_s=0.5)
     places = np.array([[0.0, 0.0, 0.0], [0.11, 0.0, 0.0], [0.4, 0.0, 0.0], [0.0, 5.0, 0.0]])
     assert are_too_near(trace, "ugv1", places, 0.6, INSIDE_M).tolist() == [False, True, True, False]
     assert not are_too_near(trace, "ugv1", places, 0.4, INSIDE_M).any()
-
-
-def rows(change: Callable[[Obstacle, Array], Array]) -> Patch:
-    """Other outlines for the robots' world."""
-    right = world.outlines_of
-    return lambda patch: patch.setattr(world, "outlines_of", lambda of, each: change(each, right(of, each)))
-
-
-def altered(**changes: Any) -> Patch:
-    """Obstacles with other values for the robots' world."""
-    right = world.outlines_of
-    return lambda patch: patch.setattr(world, "outlines_of", lambda of, each: right(of, replace(each, **changes)))
-
-
-def without_rounding(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(outline, "keep", lambda rows, radius: rows[:, outline.GAP] + radius)
-
-
-def middles(obstacle: Obstacle, found: Array) -> Array:
-    return outline.balls(np.column_stack([found[:, outline.MIDDLE : outline.EXTENT], 0.0 * found[:, 0]]), 0.0, 0.3)
-
-
-WRONG: dict[str, Patch] = {
-    "rounding forgotten": without_rounding,
-    "own distance ignored": altered(distance_m=0.0),
-    "the first part only": rows(lambda _, found: found[:1]),
-    "middles in place of nearest points": rows(middles),
-    "heading ignored": altered(heading_rad=0.0),
-    "flat": altered(height_m=0.0),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_robots_that_know_other_shapes_are_refuted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert decided("SAFE-HYP", simulated(room(1.0), "a")).status == "holds"
-    WRONG[name](monkeypatch)
-    finding = decided("SAFE-HYP", simulated(room(1.0), "a"))
-    assert finding.status == "refuted"
-    parameter = "safe_m" if name == "rounding forgotten" else "outlines"
-    assert {one["parameter"] for one in finding.evidence["different_parameters"]} >= {parameter}
-
-
-def test_a_room_is_safe_under_d_and_not_under_b() -> None:
-    trace = simulated(room(), "b")  # under (b) it is obeyed
-    assert decided("SAFE-TRACE", trace).where["second"] == "u"
-    assert decided("SAFE-TRACE", trace).margin < -0.3
-    scenario = room(20.0)
-    scenario.intervention.policies = [Policy("coordinate")]
-    trace = simulated(scenario, "d")
-    assert (trace.decisions["decision"] == "accept").any()
-    for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP"):
-        finding = decided(claim, trace)
-        assert (finding.status, finding.exercised > 0) == ("holds", True), (claim, finding)
-
-
-def test_a_wall_that_is_not_seen_is_run_into(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows(lambda each, found: found[:1] if each.segment_m else found)(monkeypatch)
-    finding = decided("SAFE-TRACE", simulated(room(), "a"))
-    assert (finding.status, finding.where["second"]) == ("refuted", "u")
-    assert finding.margin < -0.1

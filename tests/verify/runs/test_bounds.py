@@ -20,7 +20,6 @@ from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 
 @st.composite
 def problems(draw: st.DrawFn) -> GateData:
-    """Random problems, some without points, some with points on the way."""
     count, rng, flat = draw(st.integers(0, 3)), np.random.default_rng(draw(st.integers(0, 10**6))), [1.0, 1.0, 0.0]
     accept = (np.array([2.0, 3.0, 0.0]) + rng.uniform(-1.0, 1.0, (STAGES, 3))) * flat
     refuse = (np.array([0.0, 0.5, 0.0]) + rng.uniform(-0.4, 0.4, (STAGES, 3))) * flat

@@ -83,7 +83,6 @@ def stall(y: float) -> dict[str, list[float]]:
 
 
 def late(row: int, robot: str, *offset: float) -> Edit:
-    """A robot is elsewhere at a row, counted from the end."""
     return lambda trace: moved(trace, robot, len(trace.t) - row, list(offset))
 
 
@@ -92,13 +91,11 @@ def without_triggers(every: list[dict[str, Any]]) -> None:
 
 
 def false_alarm(every: list[dict[str, Any]]) -> None:
-    """A trigger near the beginning that is released before the error is at the threshold."""
     first = first_of(every, "trigger")
     every[:0] = [{**first, "t_s": 0.2}, {**first, "t_s": 0.3, "kind": "release"}]
 
 
 def released_too_soon(every: list[dict[str, Any]]) -> None:
-    """A release while the error is large, and no trigger afterwards."""
     first_of(every, "release")["t_s"] = 1.6
     del every[every.index(first_of(every, "release")) + 1 :]
 

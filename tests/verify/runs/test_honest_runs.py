@@ -1,13 +1,12 @@
 """Runs that put a claim to an unusual test, and hold; what a claim says of them."""
 
-from collections.abc import Callable
 from itertools import islice
 from typing import Any
 
 import numpy as np
 import pytest
 from builders.edits import with_meta, with_scenario
-from builders.runs import at_rest, chattering, refractory
+from builders.runs import at_rest, refractory
 from builders.scenarios import STILL, changed, lone
 from builders.simulation import simulate as simulate_synthetic
 from verify.judging import decided
@@ -17,11 +16,8 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.thr_quality import Judge, Watch
 from airground_drake.verify.engines.geometry import NormSignal
 
-Run = Callable[..., Trace]
-
 
 def held(claim: str, trace: Trace) -> dict[str, Any]:
-    """The evidence of a claim that must hold."""
     finding = decided(claim, trace)
     assert finding.status == "holds", finding
     return dict(finding.evidence)
@@ -35,12 +31,6 @@ def test_a_crossing_inside_the_dwell_triggers_at_its_end(noise: float) -> None:
     assert held("THR-TRIG", trace)
     assert set(trace.column("ugv1.mode")) == {0.0, 1.0, 2.0}
     assert decided("ZENO-TRACE", trace).margin == pytest.approx(0.0, abs=1e-12)
-
-
-def test_a_bare_trigger_chatters() -> None:
-    found = decided("ZENO-TRACE", chattering())
-    assert found.evidence["triggers"]["ugv1"]["count"] > found.evidence["most_triggers_possible"]
-    assert 0.0 < found.evidence["smallest_gap"]["gap_s"] < 0.5
 
 
 def test_above_the_threshold_at_the_start_triggers_at_once() -> None:
@@ -63,22 +53,6 @@ def test_a_corner_of_the_preset_inside_a_row_interval() -> None:
     unseen = with_meta(with_scenario(never, decision__threshold__zeta_m=3.005), zeta_m=3.005)
     found = decided("THR-TRIG", unseen).counterexample or {}
     assert (found["what"], found["t_s"]) == ("missing trigger", pytest.approx(3.005, abs=1e-9))
-
-
-@pytest.mark.parametrize("trigger", ["automaton", "bare"])
-@pytest.mark.parametrize("seed", range(3))
-def test_random_motions_and_noise(trigger: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    velocities = np.repeat(rng.normal(0.0, 2.0, (40, 3)), 4, axis=0) * [1.0, 1.0, 0.0]
-    decision = Decision(trigger=trigger, release_m=0.6, min_inter_event_s=0.4, noise_m_sqrt_s=0.2)
-    decision.threshold.zeta_m = 1.0
-    preset = Preset([[0.0, 0.0, 0.0], [0.7, 0.3, 0.0], [0.7, -0.2, 0.0]], 0.61)
-    trace = simulate_synthetic(
-        lone([0.5, 0.0, 0.0], [0.0] * 3, preset, 4.0, decision=decision), seed=seed,
-        drive=lambda t: [velocities[round(t / 0.025)].tolist(), [0.0] * 3],
-    )  # fmt: skip
-    assert held("THR-TRIG", trace)
-    assert trace.events
 
 
 def test_a_bare_trigger_is_judged_in_a_bounded_number_of_steps() -> None:

@@ -22,7 +22,6 @@ PERSON = {"radius_m": 0.05, "moves": {"waypoints_m": [[1.2, -3.0], [1.2, 0.0]], 
 
 
 def beside(obstacle: dict[str, Any], plant: Any, *, speed: float = 2.0, radius: float = 0.1, **safe: float) -> Trace:
-    """A robot that drives along x beside an obstacle on its way."""
     start, target = [0.0, 0.0, 0.0], [8.0, 0.0, 0.0]
     ugv = {
         "start_m": start, "target_m": target, "preset": {"waypoints_m": [start, target], "speed_m_s": speed},
@@ -42,7 +41,6 @@ def found(trace: Trace) -> dict[str, Any]:
 
 
 def broken(trace: Trace) -> set[str]:
-    """The hypotheses that a run breaks."""
     evidence = SafeHyp().check(trace).evidence
     names = {row["hypothesis"] for row in evidence["worst"] if row["margin"] < -1e-8}
     return names | ({"avoidance"} if evidence["e_m"] > 1e-9 else set())
@@ -121,7 +119,6 @@ LIMITS = {
 
 
 def plain(plant: str, *more: str) -> Trace:
-    """Ahead on a straight line, at 1 m/s."""
     given = [*more, f"ugvs.ugv1.plant={plant}", "ugvs.ugv1.max_speed_m_s=1.4", "obstacles={}", "uav.altitude_m=3"]
     return simulate(load("minimal", [*given, "duration_s=4.0"]), "a")
 

@@ -11,7 +11,6 @@ from persons import RADII, D, H
 from verify.judging import decided
 
 from airground_drake.base.arrays import Array
-from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import TRACE_CLAIMS, judge
 from airground_drake.verify.claim import ModelClaim
@@ -20,20 +19,17 @@ from airground_drake.verify.judging import judge_all
 from airground_drake.verify.pair_kinds import SHARES, kind_of
 from airground_drake.verify.runs import encounters as encounters_module
 from airground_drake.verify.runs.control_law import least_speeds, retreats
-from airground_drake.verify.runs.encounters import encounters, steps_of
+from airground_drake.verify.runs.encounters import steps_of
 from airground_drake.verify.runs.pairs import gap_over_time, least_gap, pair_of
 from airground_drake.verify.runs.passive import periods_of
 
 
 def of_person(trace: Trace) -> Array:
-    """Gap of the first UGV and the person at the rows, (T,), m, in plain numpy."""
     away = trace.position("ugv1") - trace.position("person")
     return np.linalg.norm(away, axis=1) - RADII
 
 
 def placed(trace: Trace, places: Array) -> Trace:
-    """A copy in which the person is at other places (T, 3), m."""
-
     def edit(states: pd.DataFrame) -> None:
         for k, axis in enumerate("xyz"):
             states[f"person.{axis}_m"] = places[:, k]
@@ -60,14 +56,6 @@ def test_a_robot_that_leaves_its_straight_line_gets_farther_from_its_place(monke
     straight = steps_of(trace, "ugv1")
     monkeypatch.setattr(encounters_module, "off_m_of", lambda *_: 0.1)
     np.testing.assert_allclose(steps_of(replace(trace), "ugv1"), straight + 0.1, rtol=1e-12)
-
-
-def test_encounters_are_told_in_the_order_in_which_they_were() -> None:
-    late, early = (persons.walking([x, y], [-9.0, y]) for x, y in ((9.0, 0.0), (4.0, 0.1)))
-    trace = simulate(persons.lone("two", -1.0, 0.0, obstacles={"a_late": late, "b_early": early}), "a")
-    told = encounters(trace)
-    assert [each.second for each in told] == ["b_early", "a_late"]
-    assert told[0].t_s < told[1].t_s
 
 
 def test_a_robot_that_has_nowhere_to_retreat_stands_and_the_wall_is_named() -> None:

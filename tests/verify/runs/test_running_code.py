@@ -22,7 +22,6 @@ def recursive(patch: pytest.MonkeyPatch) -> None:
 
 
 def altered_later(patch: pytest.MonkeyPatch) -> None:
-    """After the diagram was built."""
     right = simulation.build_model
 
     def wrong(*args: Any, **more: Any) -> Model:

@@ -32,14 +32,7 @@ LAST = -1
 """The decision of a run that is edited: no other one follows from it."""
 
 
-def at_the_end(robot: str) -> Edit:
-    """The last command is faster, and leads as much farther: nothing follows from it."""
-    return lambda trace, by: moved(trace, robot, len(trace.t) - 1, [by * float(np.diff(trace.t)[-1]), 0.0, 0.0])
-
-
 def from_the_end(key: str, robot: str = "ugv1") -> Edit:
-    """The scenario wants a robot beside where it ends."""
-
     def edit(trace: Trace, by: float) -> Trace:
         end = (trace.position(robot)[-1] + [by, 0.0, 0.0]).tolist()
         return with_scenario(trace, **{key: {robot: end} if key.endswith("stalls_m") else end})
@@ -64,18 +57,15 @@ def driven_at(_: Trace, over: float) -> Trace:
 
 
 def stepped_towards_a_person(_: Trace, by: float) -> Trace:
-    """The robot stands before the person at d + V h, and at the end comes nearer."""
     trace = persons.run("on the goal")
     return moved(trace, "ugv1", len(trace.t) - 1, [by, 0.0, 0.0])
 
 
 def at_the_trigger(trace: Trace) -> int:
-    """Its row, which is between two control samples."""
     return int(np.argmin(np.abs(trace.t - next(e["t_s"] for e in trace.events if e["kind"] == "trigger"))))
 
 
 def triggered_later(trace: Trace, by: float) -> Trace:
-    """The event and the column that agrees with it."""
     shifted = with_events(
         trace, lambda every: [{**e, "t_s": e["t_s"] + by} if e["kind"] == "trigger" else e for e in every]
     )
@@ -84,8 +74,6 @@ def triggered_later(trace: Trace, by: float) -> Trace:
 
 
 def column(name: str, unit: Callable[[Trace], float] = lambda trace: 1.0) -> Edit:
-    """A number of the last decision, changed by so many units."""
-
     def edit(trace: Trace, by: float) -> Trace:
         decisions = trace.decisions.copy()
         decisions.loc[len(decisions) - 1, name] += by * unit(trace)
@@ -95,7 +83,6 @@ def column(name: str, unit: Callable[[Trace], float] = lambda trace: 1.0) -> Edi
 
 
 def array(name: str, index: Any, *, relative: bool = False) -> Edit:
-    """A number of the last decision's problem."""
     return lambda trace, by: problem(LAST, **{name: at(index, lambda v: v * (1.0 + by) if relative else v + by)})(trace)
 
 

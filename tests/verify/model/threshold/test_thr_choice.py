@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 from builders.edits import with_scenario
 from builders.runs import run_of
-from verify.model.threshold.cases import INPUTS, TABLE_1
+from verify.model.threshold.cases import INPUTS
 
 from airground_drake.model.trigger.bayes import optimal_threshold
 from airground_drake.report import html
 from airground_drake.scenario.load import load
 from airground_drake.sim.trace import Trace
-from airground_drake.verify import judge_all, judge_model
+from airground_drake.verify import judge_model
 from airground_drake.verify.claims.thr_choice import ThrChoice
 
 
@@ -66,26 +66,6 @@ def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str
     quiet = ThrChoice().seen_in(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
     assert quiet.optimum_m == 0.0
     assert quiet.extra_risk == pytest.approx(0.5 * 3.0 / quiet.drift_m_s)
-
-
-def test_a_report_has_the_runs_beside_the_numbers_of_the_rule(run: Callable[[str, str], Trace]) -> None:
-    scenario = load("bayes_threshold")
-    runs = [run("bayes_threshold", name) for name in scenario.runs]
-    verdicts = judge_all(scenario, runs, claims=["THR-CHOICE"])
-    found, printed = [verdict.evidence for verdict in verdicts]
-    assert (set(found.runs), set(printed.runs)) == ({"a ugv1", "d ugv1"}, {"d_printed ugv1"})
-    for row in (found.runs["a ugv1"], printed.runs["d_printed ugv1"]):
-        assert row.drift_m_s == pytest.approx(1.0, abs=1e-6)
-        assert row.optimum_m == pytest.approx(found.threshold_in_force_m)
-    early = found.runs["d ugv1"]  # an intervention begins before the error is at the threshold
-    assert early.drift_m_s == pytest.approx(1.0213, abs=1e-4)
-
-
-def test_the_figure_marks_three_thresholds() -> None:
-    chart = ThrChoice().judge(TABLE_1).figure
-    assert chart is not None
-    marks = {name: tuple(f"{number:.4g}" for number in at) for name, at in chart.marks.items()}
-    assert marks == {"in force": ("3", "0.4547"), "optimal": ("2.992", "0.4547"), "(19) as printed": ("0.7557", "0.48")}
 
 
 @pytest.mark.parametrize(("kind", "shown"), [("declared", "declared"), ("optimal", "holds")])

@@ -32,8 +32,6 @@ def test_the_shipped_trigger_is_supported(judged: Judged, case_a: Scenario) -> N
 
 
 class NoDwell(Trigger):
-    """May trigger again at once."""
-
     @property
     def levels(self) -> Array:
         return np.array([self.zeta, self.release, 0.0])
