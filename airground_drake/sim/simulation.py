@@ -21,7 +21,7 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance, Composition
 from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.model.plants.first_order import FirstOrder
-from airground_drake.scenario.load import own
+from airground_drake.scenario.load import load, own
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.sim.blocks.decision import ACCURACY, DecisionVariable
@@ -29,7 +29,7 @@ from airground_drake.sim.blocks.lifetime import untie
 from airground_drake.sim.blocks.own_controller import ControllerFactory
 from airground_drake.sim.blocks.plant import OwnPlant, code_of, declared, own_code
 from airground_drake.sim.components import GatekeepersFactory, make_gatekeepers
-from airground_drake.sim.diagram import NO_PLANTS, DecisionFactory, Model, build_model
+from airground_drake.sim.diagram import NO_PLANTS, DecisionFactory, Model, build_diagram, build_model
 from airground_drake.sim.recording import Done, trace_of
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.channel import Transit
@@ -237,6 +237,9 @@ def warm_up() -> None:
     law.velocity(world.starts, near, ones, ones, [None])
     MixedIntegerRoute().solve(predicted_problem(seen, law, Proposal("", 0.0, motion), horizon))
     outcomes(seen, law, Proposal("", 0.0, motion), Outlook(longest=1.0))
+    simulator = Simulator(build_diagram(load("minimal"), "a"))
+    simulator.get_mutable_context().SetAccuracy(ACCURACY)
+    simulator.AdvanceTo(0.1)
 
 
 def simulate(

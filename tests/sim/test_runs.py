@@ -55,6 +55,7 @@ def parent_of() -> None:
 def test_one_run_alone_is_simulated_in_a_child_too(
     case_a: Scenario, monkeypatch: pytest.MonkeyPatch, does: Callable[[], Any], error: type[Exception], said: str
 ) -> None:
+    runs.warm_up()  # it simulates with a task of the package
     monkeypatch.setattr(UAV_TASKS, "load", lambda name, of: task(does))
     with UAV_TASKS.adding("of_the_test", task(does)), pytest.raises(error, match=said) as stopped:
         simulate_all(one_run(case_a), jobs=1)
@@ -64,6 +65,7 @@ def test_one_run_alone_is_simulated_in_a_child_too(
 
 def test_a_run_that_comes_no_further_is_ended(case_a: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
     hangs = task(lambda: time.sleep(600.0))
+    runs.warm_up()
     monkeypatch.setattr(UAV_TASKS, "load", lambda name, of: hangs)
     monkeypatch.setattr(runs, "STANDSTILL_S", 0.5)
     with UAV_TASKS.adding("of_the_test", hangs), pytest.raises(SimulationError, match=r"no progress in the last 0\.5"):
