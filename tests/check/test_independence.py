@@ -16,7 +16,7 @@ ALLOWED = "airground_drake.check"
 class Refuses:
     def find_spec(self, name, path=None, target=None):
         other = name.startswith("airground_drake.") and name != ALLOWED and not name.startswith(ALLOWED + ".")
-        if name.split(".")[0] in ("pydrake", "scipy", "clarabel", "numba", "matplotlib", "yaml") or other:
+        if name.split(".")[0] in ("pydrake", "scipy", "cvxpy", "numba", "matplotlib", "yaml") or other:
             raise ModuleNotFoundError(f"{name} is not installed here")
 
 sys.meta_path.insert(0, Refuses())

@@ -24,7 +24,7 @@ AIRGROUND = (sys.executable, "-m", "airground_drake")
 
 
 WITHOUT_WORK = ("--version", "--help", "list", *(f"{name} --help" for name in COMMANDS))
-HEAVY = "numpy pandas scipy numba clarabel flint matplotlib jinja2 pydantic pydrake pygraphviz"
+HEAVY = "numpy pandas scipy numba cvxpy flint matplotlib jinja2 pydantic pydrake pygraphviz"
 IMPORTED = f"""
 import sys
 from airground_drake.commands import main

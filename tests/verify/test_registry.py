@@ -57,7 +57,7 @@ def test_nothing_is_imported_before_use() -> None:
     assert not [
         name
         for name in loaded
-        if name.startswith(("pydrake", "clarabel", "airground_drake.verify.claims", "airground_drake.verify.model"))
+        if name.startswith(("pydrake", "cvxpy", "airground_drake.verify.claims", "airground_drake.verify.model"))
     ]
 
 

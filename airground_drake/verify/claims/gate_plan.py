@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import clarabel
 import numpy as np
 from scipy import sparse
 from scipy.optimize import lsq_linear
@@ -80,7 +79,7 @@ class GatePlan(GateClaim):
         "more. A stage of another plan is held to that only if the constant plan of its mode keeps clear there. "
         "Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; after a deficit "
         "within 1e-9 of 1/2 either mode may follow. For the gap, the half-plane problems of all decisions are stacked "
-        "into one convex program and solved by Clarabel. The solver is not trusted: its multipliers give the "
+        "into one convex program and solved by cvxpy and Clarabel. The solver is not trusted: its multipliers give the "
         "lower bound L by weak duality, evaluated in numpy, whatever their quality; with up to 12 blocks of stages all "
         "plans are evaluated instead. The gap is unknown if a plan has no half-planes (the route 'nonlinear' records "
         "none) or if the bounds of an optimum are more than 1e-5 apart. Problems of at most 10 choices are also solved "
@@ -415,6 +414,9 @@ def _minimiser(row: DecisionRecord, multiplier: Array) -> Array:
 def _solve(rows: Sequence[DecisionRecord]) -> tuple[list[Array], list[Array]]:
     """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to each scale, of all rows as one program."""
     # Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
+    import cvxpy  # takes a second, which other claims need not wait for
+
+    cp: Any = cvxpy  # its types are incomplete
     stages = rows[0].stages
     total = stages * len(rows)
     change = np.concatenate([row.dt * (row["accept_m_s"] - row["refuse_m_s"]) for row in rows])
@@ -422,30 +424,27 @@ def _solve(rows: Sequence[DecisionRecord]) -> tuple[list[Array], list[Array]]:
     drift = np.concatenate([row.dt * row["refuse_m_s"] - step for row, step in zip(rows, moved, strict=True)])
     follows = np.arange(3, 3 * total) // 3 % stages != 0
     dynamics = sparse.eye(3 * total) - sparse.diags(follows.astype(float), -3)
-    steering = sparse.bsr_matrix((change[:, :, None], np.arange(total), np.arange(total + 1)))
+    steering = sparse.bsr_matrix((change[:, :, None], np.arange(total), np.arange(total + 1))).tocsr()
     points = [len(row["distances_m"]) for row in rows]
     at = np.repeat(np.arange(total), np.repeat(points, stages))  # inequality by inequality, its stage
     count = len(at)
     normals = np.concatenate([row.half_planes.reshape(-1, 1, 3) for row in rows])
-    facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total))
+    facing = sparse.bsr_matrix((normals, at, np.arange(count + 1)), shape=(count, 3 * total)).tocsr()
     picks = sparse.csr_matrix((np.ones(count), at, np.arange(count + 1)), shape=(count, total))
     least = np.concatenate([-row.gaps(row["reference_m"], row.half_planes).ravel() for row in rows])
-    of_error = np.concatenate([row.error_weight * row.lasting / row.scale for row in rows])
-    of_slack = np.repeat([row.dt * row.slack_weight / row.scale for row in rows], stages)
-    weights = 2.0 * np.concatenate([np.repeat(of_error, 3), np.zeros(total), of_slack])
-    one = sparse.eye(total)
-    below = [[dynamics, -steering, None], [None, -one, None], [None, one, None], [None, None, -one]]
-    limits = [drift.ravel(), np.zeros(total), np.ones(total), np.zeros(total), -least]
-    cones = [clarabel.ZeroConeT(3 * total), clarabel.NonnegativeConeT(3 * total + count)]
-    matrix = sparse.csc_matrix(sparse.bmat([*below, [-facing, None, -picks]] if count else below))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    squares = sparse.csc_matrix(sparse.diags(weights))
-    program = squares, np.zeros(5 * total), matrix, np.concatenate(limits), cones, settings
-    found = clarabel.DefaultSolver(*program).solve()
-    if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+    of_error = np.sqrt(np.concatenate([row.error_weight * row.lasting / row.scale for row in rows]))
+    of_slack = np.sqrt([row.dt * row.slack_weight / row.scale for row in rows])
+    e = cp.Variable(3 * total)
+    omega = cp.Variable(total)
+    u = cp.Variable(total)
+    constraints = [dynamics @ e - steering @ omega == drift.ravel(), omega >= 0.0, omega <= 1.0, u >= 0.0]
+    constraints += [facing @ e + picks @ u >= least] if count else []
+    error = cp.sum_squares(cp.multiply(np.repeat(of_error, 3), e))
+    slack = cp.sum_squares(cp.multiply(np.repeat(of_slack, stages), u))
+    cp.Problem(cp.Minimize(error + slack), constraints).solve(solver=cp.CLARABEL)
+    if omega.value is None:
         raise TraceError("the independent solver gave no solution")
-    omega, dual = np.array(found.x)[3 * total : 4 * total], np.maximum(0.0, np.array(found.z)[6 * total :])
-    shares = [np.clip(part, 0.0, 1.0) for part in np.split(omega, len(rows))]
+    shares = [np.clip(part, 0.0, 1.0) for part in np.split(omega.value, len(rows))]
+    dual = np.maximum(0.0, constraints[-1].dual_value) if count else np.empty(0)
     parts = np.split(dual, np.cumsum(stages * np.array(points))[:-1])
     return shares, [part.reshape(stages, m) for part, m in zip(parts, points, strict=True)]
