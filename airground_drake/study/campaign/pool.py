@@ -2,8 +2,9 @@
 
 import itertools
 import logging
+import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
@@ -14,7 +15,8 @@ from airground_drake.base.errors import AirgroundError, one_line
 from airground_drake.base.parallel import processes
 
 DEATHS = 2  # an item is given up after this many of its processes have died
-AHEAD = 4  # items for each process that are handed out in advance
+AHEAD = 4  # items for each process that are handed out in advance; on a cluster, tasks
+TASK_S = 1.0  # what a task on a cluster should take, s: each costs Dask milliseconds
 
 T = TypeVar("T")
 
@@ -88,29 +90,43 @@ def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
 def _on_cluster(
     dask: Any, client: Any, work: Callable[[int], T], items: Iterable[int]
 ) -> Iterator[tuple[int, T | None]]:
-    """The work of `Pool` on a cluster. Names of items are unique to this client; workers may join at any time."""
-    waiting, ours = iter(items), uuid.uuid4().hex
+    """The work of `Pool` on a cluster, in blocks of items; workers may join at any time."""
+    # A block is as many items as have taken about TASK_S so far. Its name is unique to this client.
+    waiting, ours, blocks = iter(items), uuid.uuid4().hex, dict[str, Sequence[int]]()
+    began, done = time.monotonic(), 0
+
+    def handed_out(block: Sequence[int]) -> Any:
+        blocks[key := f"{ours}-{block[0]}-{len(block)}"] = block
+        return client.submit(_every, work, block, key=key, pure=False)
 
     def submit(under_way: int) -> list[Any]:
         threads = sum(client.nthreads().values()) or 1
-        some = itertools.islice(waiting, max(0, AHEAD * threads - under_way))
-        return [client.submit(work, item, key=f"{ours}-{item}", pure=False) for item in some]
+        size = 1 + int(TASK_S * done / (threads * (time.monotonic() - began))) if done else 1
+        some = [tuple(itertools.islice(waiting, size)) for _ in range(under_way, AHEAD * threads)]
+        return [handed_out(block) for block in some if block]
 
     try:
         under_way = dask.as_completed(submit(0), loop=client.loop)
         for future in under_way:
-            item = int(future.key.rpartition("-")[2])
-            yield item, _result(dask, future)
-            for more in submit(under_way.count()):
-                under_way.add(more)
+            block, results = blocks.pop(future.key), _result(dask, future)
+            if results is None and len(block) > 1:
+                under_way.update([handed_out((item,)) for item in block])
+                continue
+            done += len(block)
+            yield from zip(block, results or [None], strict=True)
+            under_way.update(submit(under_way.count()))
     except (CancelledError, OSError) as error:
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # or it shows how it fails to reconnect
         lost = f"the Dask scheduler was lost ({type(error).__name__}); --resume goes on with what is finished"
         raise AirgroundError(lost) from None
 
 
+def _every(work: Callable[[int], T], items: Sequence[int]) -> list[T]:
+    return [work(item) for item in items]
+
+
 def _result(dask: Any, future: Any) -> Any:
-    """The result of a finished item, or the exception of its work; None if its workers have died."""
+    """The results of a finished block, or the exception of its work; None if its workers have died."""
     try:
         return future.result()
     except dask.scheduler.KilledWorker:

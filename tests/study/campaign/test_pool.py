@@ -5,12 +5,14 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from builders.dying import asleep, process, times, work
 
 from airground_drake.base.errors import AirgroundError
-from airground_drake.study.campaign.pool import _result, cluster, local
+from airground_drake.study.campaign.pool import _on_cluster, cluster, local
 
 
 def test_a_process_that_dies_loses_no_item_and_does_none_twice(tmp_path: Path) -> None:
@@ -42,14 +44,35 @@ def test_campaigns_that_share_a_cluster_get_their_own_results() -> None:
 
 
 @pytest.mark.slow
-def test_an_item_that_has_killed_its_workers_is_given_up() -> None:
+def test_an_item_that_has_killed_its_workers_is_given_up_and_no_other_of_its_block() -> None:
     distributed = pytest.importorskip("distributed")
+    sizes = []
 
     class Future:
-        def result(self) -> None:
-            raise distributed.scheduler.KilledWorker("item-5", None, 3)
+        def __init__(self, call: Any, work: Any, items: Any, *, key: str, pure: bool) -> None:
+            self.key, self.items, self.call = key, items, partial(call, work, items)
 
-    assert _result(distributed, Future()) is None
+        def result(self) -> Any:
+            sizes.append(len(self.items))
+            if 500 in self.items:
+                raise distributed.scheduler.KilledWorker("block", None, 3)
+            return self.call()
+
+    class Completed(list[Any]):
+        update = list.extend
+
+        def __iter__(self) -> Any:
+            while self:
+                yield self.pop(0)
+
+        def count(self) -> int:
+            return len(self)
+
+    dask = SimpleNamespace(as_completed=lambda given, loop: Completed(given), scheduler=distributed.scheduler)
+    client = SimpleNamespace(loop=None, nthreads=lambda: {"worker": 1}, submit=Future)
+    found = sorted(_on_cluster(dask, client, partial(times, 2), range(1000)))
+    assert found == [(item, None if item == 500 else 2 * item) for item in range(1000)]
+    assert max(sizes) > 1
 
 
 SCHEDULER = """
