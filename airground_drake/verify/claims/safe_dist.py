@@ -67,8 +67,9 @@ class SafeDist(TheoremClaim):
         "then takes the least violation. So: one violated inequality at a time, or a common direction g as in the "
         "statement. A UGV straight under the UAV has no such direction; there its disturbance does not count either, "
         "and the UAV's half suffices (`Gate.overhead`).",
-        "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance, so that at least half "
-        "of that distance is left. It is a choice, not a property of a robot.",
+        "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance (A/8 where a UGV may "
+        "stand for lack of a message), so that at least half of that distance is left. It is a choice, not a property "
+        "of a robot.",
         "Positions are measured exactly and without delay.",
         "While a pair is out of sensing range, its robots command no more than their speed limits, and w comes on top. "
         "The layer itself may ask for more within a safe distance of something else.",
@@ -97,7 +98,10 @@ class SafeDist(TheoremClaim):
         given = constants(scenario)
         least = float(min(pair.safe_m for pair in kinds_of(given)))
         fastest = max(robot.max_speed_m_s for robot in scenario.robots.values())
-        return {**given, "disturbance_m_s": min(0.1 * fastest, given["avoidance_gain_1_s"] * least / 4.0)}
+        stands = any(scenario.seen(ugv)["may_stand"] for ugv in scenario.ugvs)
+        gain = given["avoidance_gain_1_s"] / (2.0 if stands else 1.0)
+        disturbance = {"disturbance_m_s": min(0.1 * fastest, gain * least / 4.0)}
+        return {**given, **disturbance, **({"ugvs_may_stand": True} if stands else {})}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         gain, h = decimal(inputs["avoidance_gain_1_s"]), decimal(inputs["period_s"])
@@ -142,7 +146,7 @@ class SafeDist(TheoremClaim):
 
 
 def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:
-    """d - W/A, m."""
+    """d - W/A, m; with A/2 between UGVs of which one may stand for lack of a message."""
     disturbed = 1 if pair.kind == "obstacle" else 2
-    pushed = disturbed * decimal(inputs["disturbance_m_s"])
-    return pair.safe_m - pushed / decimal(inputs["avoidance_gain_1_s"])
+    halved = 2 if pair.kind == "ugv_ugv" and inputs.get("ugvs_may_stand") else 1
+    return pair.safe_m - disturbed * halved * decimal(inputs["disturbance_m_s"]) / decimal(inputs["avoidance_gain_1_s"])

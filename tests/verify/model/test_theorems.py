@@ -130,3 +130,10 @@ def test_numbers_that_follow() -> None:
     scenario = load("case_a", ["uav.radius_m=0.25", "obstacles.obstacle_1.radius_m=0.1"])
     safe = {(each["kind"], each["distance_m"]) for each in CLAIMS["SAFE-INV"].inputs(scenario)["pairs"]}
     assert {("obstacle", 2.35), ("obstacle", 2.0), ("uav_ugv", 1.25)} <= safe  # both radii: the farthest, the nearest
+
+
+def test_a_disturbance_costs_twice_as_much_between_ugvs_that_may_stand() -> None:
+    claim = CLAIMS["SAFE-DIST"]
+    known, lossy = (claim.inputs(load("crossing", [f"channel.ugvs.loss={loss}"])) for loss in (0.0, 0.1))
+    usual, halved = (claim.judge(inputs | {"disturbance_m_s": 0.1}).evidence for inputs in (known, lossy))
+    assert halved.least_distances_m == {**usual.least_distances_m, "ugv_ugv": pytest.approx(1.0 - 4.0 * 0.1 / 3.0)}
