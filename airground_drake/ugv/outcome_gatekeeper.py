@@ -161,7 +161,8 @@ class OutcomeGatekeepers(Gatekeepers):
         refuse = accept = None
         cpu_s = 0.0  # of what is foreseen: to look at the clock takes as long as to keep to an answer
         basis, new = Basis(), self._discovered(known.sensed, before, i, proposal)
-        if standing == ACCEPT and self._patience.over(held, now.t):
+        came_too_late = standing == SILENT and now.t >= proposal.motion.end
+        if came_too_late or (standing == ACCEPT and self._patience.over(held, now.t)):
             reason = "over"
         elif standing == SILENT and self._patience.exhausted(held):
             reason = "exhausted"

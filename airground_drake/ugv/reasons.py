@@ -8,7 +8,7 @@ Reason = Literal[
     "first_stage",
     "stalls", "makes_way", "exhausted", "over",
 ]  # fmt: skip
-OVER: Reason = "over"  # no refusal: the proposal was executed for as long as it was accepted
+OVER: Reason = "over"  # no refusal: the proposal was executed for as long as it was accepted, or came too late
 
 
 class Words(NamedTuple):
@@ -37,7 +37,7 @@ WORDS: dict[Reason, Words] = {
     ),
     "makes_way": Words("the UGV makes way for another one and still reaches its goal"),
     "exhausted": Words("the UGV has used all of its tries and has not rested since", "it had used all of its tries"),
-    "over": Words("the time for which the proposal was accepted is over"),
+    "over": Words("the time of the proposal is over"),
 }
 
 

@@ -77,6 +77,7 @@ def _judged(trace: Trace, row: DecisionRecord, last: DecisionRecord | None, pati
         answer = ("refuse", "kept")
     else:
         answer = ("refuse", "exhausted") if patience.tries >= gate.tries else _by_outcome(row, on)
+        answer = ("refuse", "over") if t >= on.times_s[-1] else answer
         if answer[0] == "accept":
             end = min(float(on.times_s[-1]), t + gate.longest_s)
             patience.tries, patience.since, patience.until = patience.tries + 1, t, end

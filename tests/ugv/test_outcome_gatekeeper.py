@@ -121,6 +121,13 @@ def test_an_accepted_proposal_is_over_with_its_motion_or_after_the_longest_try(e
         assert not team.sees(proposal).executing
 
 
+def test_a_proposal_that_comes_after_its_motion_is_over_and_costs_no_try() -> None:
+    team = Team()
+    turn = team.sees(Proposal("way", 0.0, Motion(np.array([-2.0, team.t]), STAYS.positions), cause="other", number=0))
+    assert (turn.executing, turn.tries, team.memory.answers[0]) == (False, 0, DONE)
+    assert [decision.reason for decision in team.memory.decisions] == ["over"]
+
+
 def test_a_replaced_proposal_ends_its_try_whatever_becomes_of_the_next() -> None:
     team = Team()
     assert team.sees(making_way(0)).executing
