@@ -61,7 +61,7 @@ def test_the_distance_is_kept_whatever_the_age_of_positions(delay_s: float, loss
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 10**6), delay_s=st.floats(0.1, 0.5), loss=st.floats(0.0, 0.5),
-    period_s=st.sampled_from([0.025, 0.05, 0.1]),
+    period_s=st.sampled_from([0.025, 0.05]),
 )  # fmt: skip
 def test_no_drawn_team_comes_nearer_than_promised(seed: int, delay_s: float, loss: float, period_s: float) -> None:
     trace = simulate(old_team(seed, delay_s, loss, {"control.period_s": period_s}), "a")
