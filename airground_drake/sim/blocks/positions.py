@@ -224,14 +224,10 @@ def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
     if scenario.asynchronous and scenario.channel and scenario.ugv_links:
         seed, loss = scenario.channel.seed, scenario.ugv_links.loss
         hearing = Hearing(world, seed, loss, scenario.control.period_s, scenario.late_samples)
-        return Between(AsynchronousUgvController(world, law), {"hearing": hearing}, {}, "bodies")
-    published, link, period = (
-        "published" if scenario.sensing else "bodies",
-        scenario.ugv_links,
-        scenario.control.period_s,
-    )
+        return Between(AsynchronousUgvController(world, law), {"hearing": hearing}, {}, "bodies", "bodies")
+    link, period = scenario.ugv_links, scenario.control.period_s
+    published, seen = ("published", "seen_by_uav") if scenario.sensing else ("bodies", "bodies")
     parts, renamed = dict[str, LeafSystem](), dict[System, Mapping[str, str]]()
-    seen = "seen_by_uav" if scenario.sensing else "bodies"
     if scenario.announces:
         late, seed = (scenario.faults or Faults()).late, scenario.channel.seed if scenario.channel else 1
         parts["announcements"] = Announcements(world, period, late, seed)
