@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"    {term.key}{owner}: {term.metres:.4f} m")
         if pair.unsure_m:
             near_m = pair.gap_m + pair.unsure_m
-            print(f"    old positions: nearer than {near_m:.3f} m only to part; farther while messages are lost")
+            print(f"    old positions: within {near_m:.3f} m they may only part; farther while messages are lost")
         if pair.start:
             print(f"    promised only with {pair.start}")
     return 0

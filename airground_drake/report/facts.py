@@ -64,7 +64,8 @@ class RunFacts:
     def is_proved(self) -> bool:
         """Whether theorems keep the distances from bodies at rest and between robots, and their conditions held."""
         robots = self._scenario.robots.values()
-        known = not self._scenario.position_error_m and self._scenario.ugv_links is None
+        links = self._scenario.ugv_links
+        known = not (self._scenario.position_error_m or self._scenario.asynchronous or (links and links.loss))
         as_told = known and all(plant.kind == AS_TOLD for robot in robots for plant in robot.plant)
         needed = (*rules.PROOFS, *[rules.PROOF_OF_PLANTS][: not as_told])
         met = self.claim(rules.CONDITIONS).status in PASSING and self._spec.composition == "augmented"

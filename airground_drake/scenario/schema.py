@@ -324,7 +324,7 @@ class Control:
     law: Annotated[Words, one_of(LAWS)] = "shared"
     """How two UGVs keep apart. 'shared': each does half, by positions of this sample. 'asynchronous', with
     `channel.ugvs`: by positions of any age. A UGV keeps off all places where the other one can be until that one
-    decides again. So they need more room, V (age + period) besides the safe distance, unless they drive apart."""
+    decides again, so they need more room: within V (age + period) besides the safe distance they may only part."""
 
 
 @dataclass(slots=True)

@@ -570,8 +570,9 @@ def _standing(scenario: Scenario) -> Problems:
 
 def _faults(scenario: Scenario) -> Problems:
     """What a fault exceeds is declared."""
-    if (faults := scenario.faults) and faults.position_error_m and scenario.sensing is None:
-        yield "faults.position_error_m", faults.position_error_m, "0 without sensing: exact positions are published"
+    if (faults := scenario.faults) and faults.position_error_m and not scenario.position_error_m:
+        why = "0 without sensing.position_error_m: exact positions are published"
+        yield "faults.position_error_m", faults.position_error_m, why
     if faults and faults.late and not scenario.announces:
         yield "faults.late", faults.late, "0 without channel.ugvs.delay_s: no position is announced"
 

@@ -11,6 +11,7 @@ from airground_drake.model.plants.scripted import Scripted
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
+from airground_drake.scenario.rounding import SPARE_S
 from airground_drake.scenario.schema import Obstacle, Scenario, Uav, Ugv
 
 
@@ -26,7 +27,9 @@ def make_world(scenario: Scenario) -> World:
         frozenset(("ugv", "uav")): safe.air_ground_m,
         frozenset(("uav",)): safe.uav_m,
     }
-    return World((*robots, *obstacles), apart, control.avoidance_gain_1_s, scenario.unsure_s)
+    return World(
+        (*robots, *obstacles), apart, control.avoidance_gain_1_s, scenario.unsure_s and scenario.unsure_s + SPARE_S
+    )
 
 
 def _obstacle(scenario: Scenario, name: str, given: Obstacle) -> Body:

@@ -14,7 +14,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Mult
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, UnknownNameError, short
+from airground_drake.base.errors import PluginError, ScenarioError, UnknownNameError, short
 from airground_drake.base.registry import METHODS, UAV_TASKS, Method, method_of
 from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.world import World
@@ -222,7 +222,10 @@ def _chosen(scenario: Scenario, method: str | None, composition: str | None) -> 
     composition = "augmented" if composition is None else composition
     if composition not in COMPOSITIONS:
         raise UnknownNameError("composition", composition, COMPOSITIONS)
-    return method_of(method), composition
+    chosen = method_of(method)
+    if scenario.asynchronous and (composition != "augmented" or (chosen.intervenes and chosen.intervention_on_top)):
+        raise ScenarioError(scenario.name, "control.law", "asynchronous", "shared: avoidance is not on top in this run")
+    return chosen, composition
 
 
 def _decision_making(scenario: Scenario, n: int, variable: System, events: EventTrigger) -> Diagram:

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.scenario.rounding import SPARE_S
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.runs.pairs import pair_of
@@ -60,7 +61,7 @@ def old_positions(trace: Trace, ugv: str) -> tuple[Array, Array]:
         since = t - trace.sampled(f"{ugv}.heard_{other}_s")
         sent = np.arange(len(t)) - np.rint(since / h).astype(np.intp)
         away[:, k] = here - trace.position(other)[trace.sample_rows][sent]
-        unsure[:, k] = trace.scenario.ugvs[other].max_speed_m_s * (since + h)
+        unsure[:, k] = trace.scenario.ugvs[other].max_speed_m_s * (since + h + SPARE_S)
         safe[:, k] = pair_of(trace, ugv, other).law_m
     apart = np.linalg.norm(away, axis=2)
     return towards_old(away / np.where(apart > 0.0, apart, 1.0)[..., None], apart, safe, unsure, h)

@@ -94,6 +94,8 @@ class Avoidance:
 
     def half_spaces(self, positions: Array, near: Neighbours) -> HalfSpaces:
         """Constraints of k robots when all bodies that move are at positions (M, 3) m."""
+        if (near.share < 0.0).any():
+            raise ValueError("old positions ask for two constraints; wanted: bodies that share inequalities")
         count = near.distance.shape[1]
         half_spaces = HalfSpaces(np.zeros((len(near.members), count, 3)), np.full((len(near.members), count), -np.inf))
         which, normal, (bound, retreat) = np.empty(count, dtype=np.intp), np.empty((count, 3)), np.empty((2, count))

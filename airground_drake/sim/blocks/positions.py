@@ -17,6 +17,7 @@ from airground_drake.base.arrays import Array, Flags
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import Neighbours, World
 from airground_drake.model.law.ugv_law import UgvLaw
+from airground_drake.scenario.rounding import SPARE_S
 from airground_drake.scenario.schema import Faults, Scenario
 from airground_drake.sim.blocks.controllers import UgvController, asked_at
 from airground_drake.sim.blocks.lifetime import weakly
@@ -161,7 +162,7 @@ class AsynchronousUgvController(HearingUgvController):
             known[near.members[i]] = positions[near.members[i]]
             of_ugvs = np.flatnonzero(carried[i] < n)
             senders = carried[i, of_ugvs]
-            unsure_s = t - heard[i, senders] + self.avoidance.period
+            unsure_s = t - heard[i, senders] + self.avoidance.period + SPARE_S
             share[i, still + of_ugvs] = -near.max_speed[senders] * unsure_s
             velocity[i] = self._alone(i, known, near._replace(share=share), t, *about)
         return velocity

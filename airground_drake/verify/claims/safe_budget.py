@@ -76,7 +76,8 @@ class SafeBudget(TheoremClaim):
 
     def applies(self, scenario: Scenario) -> bool:
         """Only a scenario with robots that are not where the law steers or sees them, or that may lack a position."""
-        return takes_room(scenario) or scenario.ugv_links is not None
+        lacking = any(scenario.seen(ugv)["may_stand"] for ugv in scenario.ugvs)
+        return takes_room(scenario) or lacking or (scenario.asynchronous and len(scenario.ugvs) > 1)
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         control, robots = scenario.control, scenario.robots

@@ -46,7 +46,8 @@ class SafeDist(TheoremClaim):
         "with A/2 for A; a period in which both stand restores nothing, and can cost 2 w h more. "
         "With several points, each with D >= d - W/A, all inequalities can be met at once if there is a unit vector g "
         "with n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together. All this is "
-        "about robots and bodies at rest. Beside an obstacle that may move with V the passive inequality restores "
+        "about robots and bodies at rest, but not about two UGVs that act on old positions of each other: what these "
+        "lose adds up. Beside an obstacle that may move with V the passive inequality restores "
         "nothing: w costs w h in each period. With a retreat n.v >= w it costs w h once, and with n.v >= w + V nothing "
         "is lost."
     )

@@ -309,14 +309,14 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         pair = pairs[k]
         if pair.speed_m_s > 0.0:  # see `passive`
             continue
+        if pair.asynchronous:
+            yield _of_old_positions(trace, pair)
+            continue
         begin = int(np.searchsorted(samples, pair.row))
         end = int(np.searchsorted(samples, pair.last)) + 1
         there, planar = slice(begin, end), is_planar(trace, pair.first)
         first = places[pair.first][there]
         beside = _beside(trace, pair, places, there, float(reach[k]))
-        if pair.asynchronous:
-            yield _of_old_positions(trace, pair)
-            continue
         both = bounds[pair.first], bounds.get(pair.second, AT_REST)
         gain = of_law * Fraction(part_of_gain(*both))
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)

@@ -48,6 +48,7 @@ class SafeInv(TheoremClaim):
         "Positions are integrals of the commands, which are held between samples; all robots are sampled at the same "
         "instants.",
         "Obstacles stand still: a pair with one that may move is not covered (SAFE-OWN says what a robot keeps there). "
+        "Two UGVs that act on old positions of each other are no such pair either (SAFE-BUDGET is about them). "
         "Robots obey their speed limits: pairs out of range rely on that. D is the distance of "
         "a robot's centre from the other's centre or, signed, from an obstacle's convex core. All radii are part of d.",
         "A UGV's velocity has no z component.",

@@ -6,12 +6,13 @@ theorem `old_positions` (coq/Async.v) asks of each step s that n.s >= d + rho - 
 """
 
 from fractions import Fraction
-from math import isqrt
+from math import ceil, isqrt
 
 import numpy as np
 
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.base.exact import decimal
+from airground_drake.scenario.rounding import SPARE_S
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
@@ -22,11 +23,11 @@ BITS = 160  # lengths are enclosed to 2^-160 of their denominator
 
 
 def unsure_s(scenario: Scenario) -> float:
-    """How long UGVs reckon with any motion of another one whose messages all arrive, s; 0: they share inequalities."""
+    """How long UGVs reckon with any motion of one whose messages all arrive, s; 0: they share inequalities."""
     if scenario.control.law != "asynchronous" or (link := scenario.ugv_links) is None:
         return 0.0
-    periods = -(-decimal(link.delay_s) // decimal(scenario.control.period_s))
-    return (periods + 1) * scenario.control.period_s
+    periods = ceil(decimal(link.delay_s) / decimal(scenario.control.period_s) * (1 - Fraction(1, 10**9)))
+    return (periods + 1) * scenario.control.period_s + SPARE_S
 
 
 def heard_at(trace: Trace, by: str, of: str) -> Indices:
@@ -44,7 +45,7 @@ def heard_places(trace: Trace, by: str, of: str) -> Array:
 def unsure_m(trace: Trace, by: str, of: str) -> Array:
     """How far a UGV can be from that position until it decides again, by its speed limit, (S,), m."""
     since = trace.sampled("t_s") - trace.sampled(f"{by}.heard_{of}_s")
-    return trace.scenario.ugvs[of].max_speed_m_s * (since + trace.scenario.control.period_s)
+    return trace.scenario.ugvs[of].max_speed_m_s * (since + trace.scenario.control.period_s + SPARE_S)
 
 
 def missed_m(trace: Trace, by: str, of: str, safe_m: float) -> Array:

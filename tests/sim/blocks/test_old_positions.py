@@ -23,10 +23,10 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim.blocks.positions import AsynchronousUgvController
 from airground_drake.sim.components import make_planner
-from airground_drake.sim.diagram import make_monitor
+from airground_drake.sim.diagram import build_diagram, make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
-from airground_drake.verify import judge
+from airground_drake.verify import judge, judge_model
 from airground_drake.verify.claims.safe_budget import SafeBudget
 
 OLD = {"control.law": "asynchronous"}
@@ -191,6 +191,42 @@ def test_what_no_theorem_covers_is_refused(changes: dict[str, Any], said: str) -
     data = resolved(old_team(0, 0.3, 0.1)) | {key: changes[key] for key in changes if "." not in key}
     with pytest.raises(ScenarioError, match=said):
         from_data(data, "test", {key: changes[key] for key in changes if "." in key})
+
+
+def test_a_method_that_is_not_among_the_runs_is_refused_too() -> None:
+    with pytest.raises(ScenarioError, match="avoidance is not on top in this run"):
+        build_diagram(old_team(0, 0.3, 0.1), "c")
+
+
+@pytest.mark.parametrize(
+    ("links", "law", "status"),
+    [({}, "shared", []), ({"delay_s": 0.02}, "shared", []), ({"loss": 0.1}, "shared", ["proved"]),
+     ({}, "asynchronous", ["proved"])],
+)  # fmt: skip
+def test_the_budget_is_about_positions_that_may_be_lacking(
+    links: dict[str, float], law: str, status: list[str]
+) -> None:
+    data = resolved(team(0, None)) | {"channel": {"ugvs": links}}
+    judged = judge_model(from_data(data, "test", {"control.law": law}), claims=["SAFE-BUDGET"])
+    assert [verdict.status for verdict in judged] == status
+
+
+def test_rounding_far_from_the_origin_adds_nothing_up() -> None:
+    """Two that follow each other, 2 km away, each as near as it may be for most of the run."""
+    data = resolved(old_team(0, 0.3, 0.0))
+    ugv = {"max_speed_m_s": 1.0, "radius_m": 0.0}
+    for name, behind, speed in (("ugv1", 1.0, 0.5), ("ugv2", 3.0, 1.0)):
+        ends = [[2000.0 - behind, 2000.0, 0.0], [2020.0 - behind, 2000.0, 0.0]]
+        preset = {"waypoints_m": ends, "speed_m_s": speed}
+        ugv_data = ugv | {"start_m": ends[0], "target_m": ends[1], "preset": preset}
+        data["ugvs"][name] = data["ugvs"][name] | ugv_data
+    data["ugvs"] = {name: data["ugvs"][name] for name in ("ugv1", "ugv2")}
+    data |= {"obstacles": {}, "runs": {"a": {"method": "a"}}, "duration_s": 20.0}
+    data["uav"] |= {"start_m": [2000.0, 2000.0, 3.0], "target_m": [2018.0, 2000.0, 3.0]}
+    trace = simulate(from_data(data, "test", {}), "a")
+    (verdict,) = judge(trace, ["SAFE-HYP"])
+    assert (verdict.status, verdict.margin) == ("holds", 0.0)
+    assert safety.safe_hyp(checked(trace)).status == "holds"
 
 
 def test_the_shared_law_is_written_and_built_as_if_there_were_no_other() -> None:
