@@ -29,6 +29,7 @@ TABLE_1: dict[str, Any] = {
     **{f"obstacles.{name}.known_to_uav": True for name in ("obstacle_1", "obstacle_2", "obstacle_3", "sudden")},
     "safe_distance.obstacle_m": 2.0,
     "safe_distance.ugv_m": 2.0,
+    "control.law": "shared",
     "control.avoidance_gain_1_s": 3.0,
     "control.motion_gain_1_s": 2.0,
     "control.formation_gain_1_s": 5.0,

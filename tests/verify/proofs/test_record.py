@@ -70,7 +70,7 @@ def test_what_is_not_in_the_record_is_not_checked(copy: Path, edit: Callable[[Pa
 
 
 def test_an_unknown_theorem_is_refused_with_those_that_there_are() -> None:
-    with pytest.raises(ValueError, match=r"no theorem 'Safety.always'; there are Budget.at_samples, "):
+    with pytest.raises(ValueError, match=r"no theorem 'Safety.always'; there are Async.half_shares_fail, "):
         standing("Safety.always")
 
 
