@@ -9,7 +9,14 @@ Entry = TypeVar("Entry")
 _ONE_AT_A_TIME = Lock()  # simulations may go on from one state in several threads
 
 
-class History(Sequence[Entry], Generic[Entry]):
+class Immutable:
+    """A state that never changes: its copy is the object itself."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self
+
+
+class History(Immutable, Sequence[Entry], Generic[Entry]):
     """What happened so far. `plus` leaves the history as it was, and costs as much as what is more."""
 
     # A history shares its list with the one that it was made from. A second continuation of the same history gets a
@@ -52,7 +59,3 @@ class History(Sequence[Entry], Generic[Entry]):
 
     def __repr__(self) -> str:
         return f"History({[*self]!r})"
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self

@@ -77,7 +77,8 @@ def beforehand(report: Report) -> Iterator[Item]:
     for name, run in report.runs.items():
         why = run.metrics.no_way_reasons
         for reason, lost in grouped((why.get(ugv, ""), ugv) for ugv in run.no_way).items():
-            words = found_no_way(lost) + (f": {reason}" if reason else "")
+            who = joined(lost) if len(lost) <= MAX_NAMES else f"{len(lost)} robots"
+            words = f"the UAV found no way for {who}" + (f": {reason}" if reason else "")
             yield Item("no_way", words, run=name, anchor="happened")
     scenario = report.scenario.resolved
     longer = {name: preset_s(ugv.preset.waypoints_m, ugv.preset.speed_m_s) for name, ugv in scenario.ugvs.items()}
@@ -128,10 +129,6 @@ def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
         }
         for (policy, what), alike in kinds.items()
     ]
-
-
-def found_no_way(names: Sequence[str]) -> str:
-    return f"the UAV found no way for {joined(names) if len(names) <= MAX_NAMES else f'{len(names)} robots'}"
 
 
 def place_of(claim: Claim) -> dict[str, Any]:

@@ -151,11 +151,7 @@ class Recorder:
         return simulator
 
     def advance(self, simulator: Simulator, until: float) -> None:
-        """Advance a simulator to a time, s; the updates of that instant are still to be made.
-
-        Raises:
-            SimulationError: if Drake or a system stops; names the run and the time.
-        """
+        """Advance a simulator to a time, s; updates of that instant are still to be made; errors as of `simulate`."""
         with self._reported(simulator.get_context()):
             simulator.AdvanceTo(until)
 

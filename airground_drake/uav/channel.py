@@ -10,9 +10,9 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple
 
-from airground_drake.base.history import History
+from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.motion import SAME_S
 
 Kind = Literal["proposal", "withdrawal", "answer"]
@@ -40,7 +40,7 @@ class Delivery(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Transit:
+class Transit(Immutable):
     """The state of a link."""
 
     taken: int = 0  # messages taken from the sender
@@ -49,10 +49,6 @@ class Transit:
     lost: History[Message] = field(default_factory=History)
     # per UGV, of the messages that arrived, the one sent last
     newest: dict[int, Delivery] = field(default_factory=dict)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
 
 class Quality(NamedTuple):

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from threading import Lock
-from typing import Any, Literal, Self, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from airground_drake.base.errors import PolicyError, described, traceback_of
+from airground_drake.base.history import Immutable
 from airground_drake.base.registry import POLICIES
 from airground_drake.model.geometry import convex
 from airground_drake.model.geometry.motion import Motion
@@ -37,7 +38,7 @@ def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0)
 
 
 @dataclass(frozen=True)
-class Negotiation:
+class Negotiation(Immutable):
     """What the UAV remembers of its exchange with one UGV."""
 
     proposal: Proposal | None = None  # the proposal in force, or None
@@ -55,10 +56,6 @@ class Negotiation:
     def refused_lately(self, t: float) -> bool:
         """Whether the UGV rests at time t, s, because it has refused. Then it gets no part of a joint plan either."""
         return self.proposal is None and t < self.retry_at and not self.in_vain
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,8 @@ the proposal, or gets another one. A UAV that is lost repeats nothing.
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
 
-from airground_drake.base.history import History
+from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.uav.channel import Delivery, Message, Transit
 from airground_drake.uav.messages import SILENT, Report, Reports
@@ -16,16 +15,12 @@ from airground_drake.uav.planner import PlannerState
 
 
 @dataclass(frozen=True)
-class Outbox:
+class Outbox(Immutable):
     """All that UAVs have sent, and what they wait for."""
 
     taken: tuple[tuple[int, int], ...] = ()  # of each UAV, proposals and withdrawals of its planner that were posted
     messages: History[Message] = field(default_factory=History)
     waiting: Mapping[int, Message] = field(default_factory=dict)  # per UGV, the message to repeat, as last sent
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
 
 def posted(box: Outbox, memories: Sequence[PlannerState]) -> Outbox:

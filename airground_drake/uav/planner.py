@@ -8,12 +8,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.history import Immutable
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.geometry import outline
 from airground_drake.model.geometry.motion import Motion
@@ -49,7 +50,7 @@ class Mover(NamedTuple):
 
 
 @dataclass(frozen=True)
-class PlannerState:
+class PlannerState(Immutable):
     """What the UAV remembers between planning periods."""
 
     talks: tuple[Negotiation, ...]  # negotiations, one per UGV
@@ -61,10 +62,6 @@ class PlannerState:
     # Obstacles that move, as UGVs last reported them, with the time of the report, s, by name.
     seen: tuple[tuple[Sighting, float], ...] = ()
     memories: tuple[Any, ...] = ()  # `Policy.remembered` of the policies
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
     @property
     def faults(self) -> list[Asked]:

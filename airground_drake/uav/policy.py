@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from airground_drake.base.arrays import LARGEST, Array, read_only
+from airground_drake.base.history import Immutable
 from airground_drake.model.geometry import outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.task import pseudoinverse
@@ -132,7 +133,7 @@ class Observation:
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
+class Proposal(Immutable):
     """The message that the UAV sends to one UGV: its intervention task, eqs (12)-(14), as data.
 
     Attributes:
@@ -170,10 +171,6 @@ class Proposal:
     def chosen(self) -> Array:
         """J_int^+ J_int, the projector onto the directions in which the UAV intervenes, (3, 3)."""
         return pseudoinverse(self.selection) @ self.selection
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
 
 SHORTEST_LEG_S = 1e-8

@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
 
-from airground_drake.base.history import History
+from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.uav.channel import Delivery, Message
 from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, Report, Reports, Told, answer_to
@@ -21,7 +20,7 @@ MOST_REPEATS = 5
 
 
 @dataclass(frozen=True)
-class Desk:
+class Desk(Immutable):
     """What lies in front of n UGVs: what they have read, what they hold, what they have sent."""
 
     held: Proposals  # the proposals in force, one entry per UGV
@@ -36,10 +35,6 @@ class Desk:
     def empty(cls, count: int) -> Desk:
         """Of `count` UGVs that have read nothing."""
         return cls((None,) * count, (-1,) * count, (None,) * count)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
 
 def read(desk: Desk, arrived: Sequence[Delivery], t: float) -> Desk:
@@ -84,7 +79,7 @@ def replied(
 
 
 @dataclass(frozen=True)
-class Obeying:
+class Obeying(Immutable):
     """UGVs under method (b), which accept all that they read, when they read it."""
 
     desk: Desk
@@ -95,10 +90,6 @@ class Obeying:
     def empty(cls, count: int) -> Obeying:
         """Of `count` UGVs that have read nothing."""
         return cls(Desk.empty(count), (Report(),) * count)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
     def after(self, arrived: Sequence[Delivery]) -> Obeying:
         """After all that arrived, each message at its time."""

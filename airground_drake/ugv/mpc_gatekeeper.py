@@ -8,13 +8,13 @@ import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from time import thread_time
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.base.errors import PluginError, described, one_line, raised_as, short
-from airground_drake.base.history import History
+from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
@@ -42,7 +42,7 @@ from airground_drake.ugv.solution import ConstantPlans, Solution, after_failure
 
 
 @dataclass(frozen=True, eq=False)
-class GatekeeperState:
+class GatekeeperState(Immutable):
     """The memory of the gatekeepers of n UGVs between samples."""
 
     answers: tuple[float, ...]  # in force, (2n,), see `messages`
@@ -65,10 +65,6 @@ class GatekeeperState:
         held = (Commitment(),) * count
         desk = Desk.empty(count) if channel else None
         return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held, desk=desk)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,16 +90,13 @@ def decision_table(decisions: Sequence[dict[str, Any]]) -> pd.DataFrame:
 
 def message_table(events: Sequence[dict[str, Any]], decisions: Sequence[dict[str, Any]], uav: str) -> pd.DataFrame:
     """A message for each proposal among the events, and for each decision; each is read when it is sent."""
-    sent = [("proposal", k, uav, e["robot"], k, e["t_s"]) for k, e in enumerate(_proposed(events))]
+    proposed = enumerate(event for event in events if event["kind"] == "proposal")
+    sent = [("proposal", k, uav, e["robot"], k, e["t_s"]) for k, e in proposed]
     sent += [("answer", d["answer"], d["robot"], uav, d.get("number", 0), d["t_s"]) for d in decisions]
     names = ("kind", "number", "sender", "receiver", "about", "sent_s")
     rows = [dict(zip(names, each, strict=True)) for each in sent]
     at_once = ({"attempt": 0, "copy": 0, "received_s": row["sent_s"], "read_s": row["sent_s"]} for row in rows)
     return typed([row | more for row, more in zip(rows, at_once, strict=True)], MESSAGE_COLUMNS)
-
-
-def _proposed(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [event for event in events if event["kind"] == "proposal"]
 
 
 def reference_at(preset: dict[str, Any], t: float) -> list[float]:

@@ -51,10 +51,6 @@ def layer(**changed: Any) -> Patch:
     return lambda patch: patch.setattr(components, "make_avoidance", wrong)
 
 
-def mobility_lost(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Body, "mobility", np.ones(3))
-
-
 def on_top(patch: pytest.MonkeyPatch) -> None:
     right = components.make_law
     patch.setattr(components, "make_law", lambda *args: replace(right(*args), intervention_on_top=True))
@@ -90,7 +86,7 @@ MISBUILT: dict[str, tuple[Patch, str]] = {
     "no gain": (layer(gain=0.0), "gain_1_s"),
     "range cut": (layer(sensing_range=2.1), "sensing_range_m"),
     "twice the period": (layer(period=0.1), "sampling_s"),
-    "planar mobility lost": (mobility_lost, "mobility"),
+    "planar mobility lost": (lambda patch: patch.setattr(Body, "mobility", np.ones(3)), "mobility"),
     "intervention on top": (on_top, "intervention_on_top"),
     "UAV without its layer": (unlayered, "sensing_range_m"),
     "speed limits times 1.5": (speeding, "max_speed_m_s"),

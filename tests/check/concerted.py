@@ -13,7 +13,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -203,14 +202,6 @@ def crash_called_proved(folder: Path) -> None:
     proved.write(folder)
 
 
-def columns_of_reality(folder: Path) -> None:
-    write_table(folder, read_table(folder).assign(true_x_m=0.0))
-
-
-def seeds_row(**values: Any) -> Edit:
-    return report("seeds", -1, value=lambda old: old | values)
-
-
 FORGERIES: dict[str, tuple[str, Edit]] = {
     # statuses
     "crash called safe": ("i, ii", crash_called_safe),
@@ -241,7 +232,7 @@ FORGERIES: dict[str, tuple[str, Edit]] = {
         "iii", made_again(rows(lambda f: f[np.abs(f["t_s"] / 0.05 - (f["t_s"] / 0.05).round()) < 1e-6])),
     ),
     "collision left out": ("i, ii, iii", RULES["collision left out"][1]),
-    "column of real positions": ("iii", made_again(columns_of_reality)),
+    "column of real positions": ("iii", made_again(rows(lambda frame: frame.assign(true_x_m=0.0)))),
     # messages, decisions, faults
     "refusal forgotten": ("iii", made_again(refusal_forgotten)),
     "bound lowered": ("iii", made_again(bound_lowered)),
@@ -253,7 +244,7 @@ FORGERIES: dict[str, tuple[str, Edit]] = {
     "another diagram": ("iii", made_again(words("diagram.svg", "gatekeeper", "oracle"))),
     "crash called proved": ("ii", crash_called_proved),
     # metadata
-    "outcome of another seed": ("iii", made_again(seeds_row(min_distance_m=2.5))),
+    "outcome of another seed": ("iii", made_again(report("seeds", -1, "min_distance_m", value=2.5))),
     "another machine": ("", made_again(report("provenance", "platform", value="a robot"))),
 }  # fmt: skip
 """32 forgeries, and who refuses them at least: '' what is taken as recorded."""

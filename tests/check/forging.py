@@ -151,6 +151,12 @@ def forged(report: Path, edit: Edit, *, mended: bool = True) -> Path:
     return folder
 
 
+def refusals(report: Path, edit: Edit) -> dict[str, str]:
+    """What the checker says against a forged copy, by claim."""
+    found = checker.checked(forged(report, edit), checker.LIMIT_S)
+    return {line.claim: line.text for line in found if line.outcome != AGREES}
+
+
 def _parts(value: Any) -> Any:
     """What a value is made of."""
     if isinstance(value, dict):

@@ -12,7 +12,7 @@ import pytest
 from builders import logs
 from builders.edits import moved, with_meta, with_scenario
 from check.forgeries import all_of, cells, claim, everywhere, rows
-from check.forging import Edit, edited_report, edited_table, forged, mend
+from check.forging import Edit, edited_report, edited_table, forged, mend, refusals
 from hypothesis import given
 from hypothesis import strategies as st
 from persons import FORK, lone, walking
@@ -20,8 +20,7 @@ from sharing import once
 
 from airground_drake.base import files
 from airground_drake.base.errors import LogError
-from airground_drake.check.command import LIMIT_S, checked
-from airground_drake.check.line import AGREES, DISAGREES
+from airground_drake.check.line import DISAGREES
 from airground_drake.check.rules import SMALL
 from airground_drake.check.scenario import Pair, pairs_of, way_m
 from airground_drake.report import document, rebuild
@@ -125,11 +124,6 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
         mend(folder)
 
     return lambda name: once(above / name.replace(" ", "_"), lambda folder: make(name, folder))
-
-
-def refusals(report: Path, edit: Edit) -> dict[str, str]:
-    """What the checker says against a forged copy, by claim."""
-    return {line.claim: line.text for line in checked(forged(report, edit), LIMIT_S) if line.outcome != AGREES}
 
 
 FORGED = ("on the goal", "standing", "leaving", "a step nearer")

@@ -94,10 +94,6 @@ def part_lost(trace: Trace) -> Trace:
     return replace(left, **{k: v[v["number"] != gone["number"]].reset_index(drop=True) for k, v in tables.items()})
 
 
-def every_decision(**values: Any) -> Edit:
-    return lambda trace: replace(trace, decisions=trace.decisions.assign(**values))
-
-
 def one_more(where: Callable[[pd.DataFrame], Any], later_s: float) -> Edit:
     def edit(trace: Trace) -> Trace:
         row = trace.decisions[where(trace.decisions)].iloc[[-1]]
@@ -149,7 +145,7 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
         ("proposal before the trigger", B_D, with_proposal(issued_s=5.0), "proposal while nobody needs it"),
         ("to the other UGV", B_D, with_proposal(robot="ugv2", cause="ugv2"), "proposal while nobody needs it"),
         ("decision after the release", B_D, one_more(executing, 0.2), "decision while nobody needs it"),
-        ("kept and told", B_D, every_decision(answer=7), "answers out of turn"),
+        ("kept and told", B_D, lambda t: replace(t, decisions=t.decisions.assign(answer=7)), "answers out of turn"),
         ("another answer, not told", B_D, first(refused, answer=-1), "answers out of turn"),
         ("map before the answer", B_D, told(0), "map of a proposal"),
         ("map forgotten", B_D, told(-1, slice(-1)), "map of a proposal"),

@@ -2,15 +2,16 @@
 
 from bisect import bisect_right
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from airground_drake.base.arrays import Array, read_only
+from airground_drake.base.history import Immutable
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Immutable):
     """Piecewise-linear motion through positions at given times; at rest before the first and after the last.
 
     Immutable, and therefore shared rather than copied when a Context is.
@@ -42,10 +43,6 @@ class Motion:
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "slopes", slopes)
         object.__setattr__(self, "_times", times.tolist())
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
     @classmethod
     def at_speed(cls, waypoints: Array, speed: float, start: float = 0.0) -> Self:

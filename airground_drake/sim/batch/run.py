@@ -238,12 +238,7 @@ class Going:
         return self._state.place[: len(self._batch.world.robots)].copy()
 
     def advance(self, until: float) -> None:
-        """Go on to a time, s; the updates of that instant are still to be made.
-
-        Raises:
-            SimulationError: if planner or gatekeeper stop the run; names it and the time.
-            LeftToDrakeError: if the run ends in another error.
-        """
+        """Go on to a time, s; the updates of that instant are still to be made; raises as `Batch.simulate`."""
         while True:
             code = loop.advance(self._team, self._around, self._accepted, self._state, self._log, until, self._enter)
             self._enter = loop.AGAIN if code == loop.FULL else loop.GO_ON

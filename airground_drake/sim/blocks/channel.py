@@ -7,12 +7,11 @@ same. So a link without delay and loss delays nothing, not even by a period.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import nan
-from typing import Any, Self
 
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State, ValueProducer
 
-from airground_drake.base.history import History
+from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.sim.blocks.lifetime import weakly
 from airground_drake.sim.blocks.signals import keep
@@ -22,17 +21,13 @@ from airground_drake.uav.planner import PlannerState
 
 
 @dataclass(frozen=True)
-class Down:
+class Down(Immutable):
     """The state of the link from UAVs."""
 
     box: Outbox = field(default_factory=Outbox)
     transit: Transit = field(default_factory=Transit)
     # when its UAV read each answer that arrived, s, in the order of arrival; NaN: never
     read_s: History[float] = field(default_factory=History)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
 
 class Downlink(LeafSystem):

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from airground_drake.base.arrays import Array
+from airground_drake.base.history import Immutable
 from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.world import World
 from airground_drake.model.law.avoidance import Avoidance
@@ -63,15 +64,11 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Memory:
+class Memory(Immutable):
     """Memory of the monitor."""
 
     sample: Sample | None = None
     violation: Violation | None = None
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Immutable: the copy is the object itself."""
-        return self
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,7 @@ class _Search:
             self._alone()
             if len(self._without_way) > before:
                 ways, failed = self._in_either_way(self._by_length(self._without_way))
-        able = self._able()
+        able = [i for i in range(len(self._movers)) if i not in self._without_way]
         if failed is not None and len(able) > 1:
             ways, failed = self._in_other_orders(failed)
         complete = ways if failed is None else None
@@ -163,10 +163,6 @@ class _Search:
         self._limit = max(self._limit, self.spent + IMPROVING * self._most)
         self._refine(others, able)
         return others if ways is None else min(ways, others, key=sum_of_times)
-
-    def _able(self) -> list[int]:
-        """The robots that are not known to be without a way even alone."""
-        return [i for i in range(len(self._movers)) if i not in self._without_way]
 
     def _alone(self) -> list[Way | None]:
         """The ways that the robots would have without each other; notes robots without a way."""

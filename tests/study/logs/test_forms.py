@@ -252,10 +252,6 @@ def ros2_echo(folder: Path) -> Path:
     return folder
 
 
-def dated() -> list[list[str]]:
-    return logs.long(FULL, "date,robot,x,y,z", lambda t: f"2026-05-04T12:00:{t:09.6f}Z")
-
-
 def vicon() -> list[list[str]]:
     """The name of a body stands once above its columns, and units below the axes."""
     lines: list[list[str]] = [["", ""], ["Frame", "Time"], ["", "s"]]
@@ -282,11 +278,6 @@ def ros2(storage: str) -> Callable[[Path], Path]:
         return folder / "bag"
 
     return write
-
-
-def ros2_file(folder: Path) -> Path:
-    """An MCAP file of ROS 2 without its folder."""
-    return next(ros2("MCAP")(folder).glob("*.mcap"))
 
 
 def humble(folder: Path) -> Path:
@@ -433,14 +424,14 @@ FORMS = {
         table("log.csv", lambda: [["t", *(f"{axis}_{name}" for name in FULL for axis in "xyz")], *logs.wide(FULL)[1:]]),
         FULL,
     ),
-    "dates": Form(table("log.csv", dated), FULL),
+    "dates": Form(table("log.csv", lab(FULL, "date,robot,x,y,z", lambda t: f"2026-05-04T12:00:{t:09.6f}Z")), FULL),
     "Vicon": Form(table("log.csv", vicon), FULL, ("millimetres, as the file says",)),
     "ROS 2, echo": Form(ros2_echo, FULL),
     "named poses": Form(captured, FULL),
     "ROS 1": Form(ros1, JITTER),
     "ROS 2, sqlite3": Form(ros2("SQLITE3"), JITTER),
     "ROS 2, MCAP": Form(ros2("MCAP"), JITTER),
-    "ROS 2, MCAP without folder": Form(ros2_file, JITTER),
+    "ROS 2, MCAP without folder": Form(lambda folder: next(ros2("MCAP")(folder).glob("*.mcap")), JITTER),
     "ROS 2, no definitions": Form(humble, JITTER),
     "ROS 2, packed file": Form(packed(humble), JITTER),
     "ROS 2, packed messages": Form(packed_messages, JITTER),
