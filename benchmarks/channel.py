@@ -41,7 +41,7 @@ def over(scenario: str, **changes: Any) -> Scenario:
         given = from_data(maps.scenario_of(course, [{"name": "coordinate"}]), course.name)
     else:
         given = load(scenario)
-    return validated(replace(given, runs={"d": given.runs["d"]}), changes)
+    return validated(replace(given, runs={"d": given.runs["d"]}, reproduction=[]), changes)
 
 
 def run(
