@@ -14,6 +14,7 @@ from check.forging import attempt, edited_report, edited_table, forged, mend, re
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
+from sharing import once
 
 from airground_drake import check
 
@@ -40,13 +41,11 @@ def test_hostile_files_are_refused(report: Path, name: str) -> None:
 
 
 @pytest.fixture(scope="module", name="whole")
-def with_third_party_code(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def with_third_party_code(shared: Path) -> Iterator[Path]:
     """The report that is forged below; each scenario is simulated again once."""
-    folder = tmp_path_factory.mktemp("forged") / "whole"
-    make(folder)
     with pytest.MonkeyPatch.context() as patch:
         simulating_once(patch)
-        yield folder
+        yield once(shared / "whole", make)
 
 
 @pytest.mark.slow

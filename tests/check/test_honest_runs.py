@@ -23,7 +23,6 @@ KINDS: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {
     "bayes": ("c", {"decision": {"threshold": {"rule": "bayes", **DRIFT}, "release_m": 0.01}}),
     "printed": ("d", {"decision": {"threshold": {"rule": "printed", **DRIFT}, "release_m": 0.01}}),
     "reversals": ("c", {"decision": AT_ONCE, "gatekeeper": {"switching_margin": 0.0, "min_dwell_s": 0.3}}),
-    "small_budgets": ("c", {"decision": AT_ONCE, "gatekeeper": {"budget_iterations": 1}}),
 }
 """A method, and changes of what is drawn."""
 
