@@ -29,7 +29,7 @@ from airground_drake.sim.tables import (
     typed,
 )
 from airground_drake.sim.trace import Trace
-from airground_drake.uav.channel import Delivery, Message, Transit
+from airground_drake.uav.channel import Delivery, Kind, Message, Transit
 from airground_drake.uav.database import Asked
 from airground_drake.uav.planner import PlannerState
 from airground_drake.uav.policy import Proposal
@@ -312,15 +312,11 @@ _ORDER = ("answer", "withdrawal", "proposal")  # kinds of messages of one instan
 def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[str, Any]]:
     """Rows of messages; each is delivered when it is sent."""
     sent = _sent(memories)
-    parties = {proposal.number: (proposal.sender, trace.ugvs[i]) for i, proposal in sent}
+    parties = {proposal.number: (proposal.sender, i) for i, proposal in sent}
 
-    def row(kind: str, number: int, about: int, sent_s: float, read_s: float) -> dict[str, Any]:
+    def row(kind: Kind, number: int, about: int, sent_s: float, read_s: float) -> dict[str, Any]:
         uav, ugv = parties[about]
-        sender, receiver = (ugv, uav) if kind == "answer" else (uav, ugv)
-        return {
-            "kind": kind, "number": number, "attempt": 0, "copy": 0, "sender": sender, "receiver": receiver,
-            "about": about, "sent_s": sent_s, "received_s": sent_s, "read_s": read_s,
-        }  # fmt: skip
+        return _row(Message(kind, number, about, ugv, sent_s), 0, sent_s, read_s, uav, trace.ugvs)
 
     read, never = dict(read for memory in memories for read in memory.read), float("nan")
     latest_first = (trace.decisions[name].tolist()[::-1] for name in ("number", "t_s"))

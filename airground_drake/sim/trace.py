@@ -206,10 +206,6 @@ class Trace:
         """Positions of the body of a robot, or of an obstacle that moves, (T, 3), m, world frame."""
         return self._vectors(self.column, robot, "body_", "m") if self.is_apart(robot) else self.position(robot)
 
-    def body_velocity(self, robot: str) -> Array:
-        """Velocities of the body of a robot whose plant records them, (T, 3), m/s, world frame."""
-        return self._vectors(self.column, robot, "body_v", "m_s")
-
     def heading(self, robot: str) -> Array | None:
         """Headings of a robot whose plant records them, (T,), rad, counter-clockwise from x; else None."""
         name = f"{robot}.heading_rad"

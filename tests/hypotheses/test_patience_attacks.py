@@ -153,7 +153,7 @@ def test_the_longest_attacks_do_not_get_through_with_the_numbers_of_case_b() -> 
     inputs = claim.inputs(load("case_b"))
     patience = Patience(*(inputs[name] for name in ("tries", "rest_s", "longest_s")))
     for each in attacks(patience, inputs["period_s"], ("endless", "greedy")).values():
-        assert each.executed_s <= claim.judge(inputs).evidence.bound_s + 1e-9, each
+        assert each.executed_s <= claim.judge(inputs).evidence["bound_s"] + 1e-9, each
         assert not each.unexpected, each
 
 

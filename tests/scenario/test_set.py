@@ -46,6 +46,6 @@ def test_only_the_runs_that_are_asked_for_are_checked() -> None:
 def test_claims_about_the_model_are_judged_for_a_run_that_changes_their_constants() -> None:
     scenario = with_run({"decision.threshold.zeta_m": 2}, {"THR-CHOICE": "exercised"})
     _, choice, other = judge_model(scenario, claims=["SAFE-INV", "THR-CHOICE"])
-    assert [each.evidence.threshold_in_force_m for each in (choice, other)] == [3.0, 2.0]
+    assert [each.evidence["threshold_in_force_m"] for each in (choice, other)] == [3.0, 2.0]
     assert [(each.run, each.expected) for each in (choice, other)] == [("", "holds"), ("other", "exercised")]
     assert not other.as_expected  # it is declared

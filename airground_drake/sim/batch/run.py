@@ -68,23 +68,19 @@ class Batch:
         for body in world.moving:
             if not isinstance(body.plant, FirstOrder | Unicycle | Lag | Delay | Scripted):
                 raise LeftToDrakeError(f"the plant of {body.name}")
-        if given.sensing is not None:
-            raise LeftToDrakeError("errors of measured positions")
-        if given.faults is not None:
-            raise LeftToDrakeError("faults")
         (flown_by, uav), *more = given.aerial.items()
-        if given.channel is not None and method.intervenes:
-            raise LeftToDrakeError("a channel")
-        if given.ugv_links is not None:
-            raise LeftToDrakeError("positions of UGVs over links")
-        if more:
-            raise LeftToDrakeError("several UAVs")
-        if uav.lost_at_s:
-            raise LeftToDrakeError("a UAV that is lost")
-        if given.gatekeeper.budget == "wall_clock" and method.gated:
-            raise LeftToDrakeError("a gatekeeper with a limit by the clock")
-        if given.ugv_controller is not None:
-            raise LeftToDrakeError(f"the controller {given.ugv_controller.kind} of the UGVs")
+        left: dict[str, object] = {
+            "errors of measured positions": given.sensing is not None,
+            "faults": given.faults is not None,
+            "a channel": given.channel is not None and method.intervenes,
+            "positions of UGVs over links": given.ugv_links is not None,
+            "several UAVs": bool(more),
+            "a UAV that is lost": uav.lost_at_s > 0.0,
+            "a gatekeeper with a limit by the clock": given.gatekeeper.budget == "wall_clock" and method.gated,
+            f"the controller {given.ugv_controller and given.ugv_controller.kind} of the UGVs": given.ugv_controller,
+        }
+        for why in (why for why, applies in left.items() if applies):
+            raise LeftToDrakeError(why)
         if UAV_TASKS.load(uav.task, of=Task) is not FormationTask:
             raise LeftToDrakeError(f"the task {uav.task} of the UAV")
         presets = components.make_presets(given)

@@ -1,20 +1,11 @@
 """LIVE-GATE: an accepted intervention is not reversed without news, and ends in time (coq/Patience.v)."""
 
-from dataclasses import dataclass
 from typing import Any
 
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.live_wait import LiveWait
-from airground_drake.verify.model.theorem import Proof
 from airground_drake.verify.runs.passive import beside
 from airground_drake.verify.runs.proposals import Acceptance, acceptances
-
-
-@dataclass(frozen=True, kw_only=True)
-class LatestEnd(Proof):
-    """After how long an accepted intervention is over at the latest, s."""
-
-    over_after_s: float
 
 
 class LiveGate(LiveWait):
@@ -50,8 +41,8 @@ class LiveGate(LiveWait):
 
     theorems = ("Patience.kept", "Patience.over_in_time")
 
-    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
-        return LatestEnd(over_after_s=float(inputs["longest_s"] + inputs["period_s"]), **proof)
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
+        return {"over_after_s": float(inputs["longest_s"] + inputs["period_s"])}
 
     def seen_in(self, trace: Trace) -> tuple[int, int]:
         """The acceptances during which no obstacle was new and none in range may move, and all."""

@@ -1,20 +1,12 @@
 """LIVE-WAIT: no UAV keeps a UGV from its own task for longer than a bound (coq/Patience.v)."""
 
-from dataclasses import dataclass
 from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 from airground_drake.verify.runs.proposals import below_avoidance
-
-
-@dataclass(frozen=True, kw_only=True)
-class Bound(Proof):
-    """How long a UAV can keep a UGV from its own task between two rests, s."""
-
-    bound_s: float
 
 
 class LiveWait(TheoremClaim):
@@ -64,9 +56,9 @@ class LiveWait(TheoremClaim):
             Hypothesis.of("gatekeeper's period", "the gatekeeper's period is above 0", period, "s", strict=True),
         ]
 
-    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
         bound = inputs["tries"] * (decimal(inputs["longest_s"]) + decimal(inputs["period_s"]))
-        return Bound(bound_s=float(bound), **proof)
+        return {"bound_s": float(bound)}
 
     def seen_in(self, trace: Trace) -> tuple[int, int]:
         return below_avoidance(trace)

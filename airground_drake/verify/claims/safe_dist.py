@@ -5,7 +5,7 @@ an obstacle, 2 w between robots. Other symbols are those of `safe_inv.py`.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from math import inf
 from typing import Any
@@ -15,22 +15,9 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.safe_inv import stable
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, is_proof
 from airground_drake.verify.pair_kinds import PairKind, constants, kinds_of
 from airground_drake.verify.runs.passive import beside
-
-
-@dataclass(frozen=True, kw_only=True)
-class LeastDistances(Proof):
-    """The least distances of a centre from the other's core, m, by kind of pair; none without a gain."""
-
-    # Of all runs of a report the periods in which a robot was too near to an obstacle that may move: with `w_h_once` it
-    # retreats at w or more, and with `kept` at w + V or more.
-
-    least_distances_m: dict[str, float] | None = None
-    passive_periods: int | None = None
-    passive_periods_w_h_once: int | None = None
-    passive_periods_kept: int | None = None
 
 
 class SafeDist(TheoremClaim):
@@ -117,13 +104,13 @@ class SafeDist(TheoremClaim):
             for pair in kinds_of(inputs)
         ]
 
-    def evidence(self, inputs: dict[str, Any], **proof: Any) -> LeastDistances:
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
         if not inputs["avoidance_gain_1_s"] > 0.0:
-            return LeastDistances(**proof)
+            return {}
         least = dict[str, float]()
         for pair in kinds_of(inputs):
             least[pair.kind] = min(float(left_m(inputs, pair)), least.get(pair.kind, inf))
-        return LeastDistances(least_distances_m=least, **proof)
+        return {"least_distances_m": least}
 
     def seen_in(self, trace: Trace) -> tuple[int, int, int]:
         """Periods too near to an obstacle that may move, and those of them with a retreat at w, and at w + V."""
@@ -138,12 +125,10 @@ class SafeDist(TheoremClaim):
 
     def with_runs(self, finding: Finding, seen: Sequence[tuple[int, ...]]) -> Finding:
         passive, once, kept = (sum(column) for column in zip(*seen, (0, 0, 0), strict=True))
-        if not passive or not isinstance(finding.evidence, LeastDistances):
+        if not passive or not is_proof(finding.evidence):
             return finding
-        evidence = replace(
-            finding.evidence, passive_periods=passive, passive_periods_w_h_once=once, passive_periods_kept=kept
-        )
-        return replace(finding, evidence=evidence)
+        periods = {"passive_periods": passive, "passive_periods_w_h_once": once, "passive_periods_kept": kept}
+        return replace(finding, evidence=finding.evidence | periods)
 
 
 def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:

@@ -5,7 +5,7 @@ follows. The parameters of the controllers are compared with the scenario (`dema
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, partial
 from itertools import groupby, permutations
@@ -102,24 +102,6 @@ class Guarantee(NamedTuple):
         return self.gap_m - self.pair.required_m
 
 
-@dataclass(frozen=True)
-class Hypotheses:
-    """The evidence: the largest shortfall, the least distance promised, and details."""
-
-    # `guarantee_m` is None if no pair came within reach, or nothing is promised for one that did. `pairs` are those
-    # with the least guarantee, `worst` is the least margin of each other hypothesis.
-
-    e_m: float
-    guarantee_m: float | None
-    pairs: list[dict[str, Any]]
-    pairs_in_reach: int
-    different_parameters: list[dict[str, Any]]
-    worst: list[dict[str, Any]]
-    inequalities_in_range: int
-    inequalities_that_bind: dict[str, int]
-    tolerance_m: float = DISTANCE_TOLERANCE_M
-
-
 class SafeHyp(TraceClaim):
     id = "SAFE-HYP"
     subject = "conditions of the proof"
@@ -205,22 +187,24 @@ class SafeHyp(TraceClaim):
         shown = _shown(first, worst, listed, kept)
         name = shown["hypothesis"]
         in_range, binding = _binding(trace)
-        evidence = Hypotheses(
-            e_m=float(max((promised.missed_m.max() for promised in kept), default=0.0)),
-            guarantee_m=_finite(kept[0].gap_m) if kept else None,
-            pairs=listed,
-            pairs_in_reach=len(kept),
-            different_parameters=different,
-            worst=worst,
-            inequalities_in_range=in_range,
-            inequalities_that_bind=binding,
-        )
-        more: dict[str, Sequence[Any]] = {
+        evidence: dict[str, Any] = {
+            "e_m": float(max((promised.missed_m.max() for promised in kept), default=0.0)),
+            # None if no pair came within reach, or nothing is promised for one that did
+            "guarantee_m": _finite(kept[0].gap_m) if kept else None,
+            "pairs": listed,
+            "pairs_in_reach": len(kept),
+            "different_parameters": different,
+            "worst": worst,
+            "inequalities_in_range": in_range,
+            "inequalities_that_bind": binding,
+            "tolerance_m": DISTANCE_TOLERANCE_M,
+        }
+        more = {
             "beside_moving": beside_moving(trace), "least_shares": least_shares(trace), "own_plants": own_plants(trace)
         }  # fmt: skip
-        by_steps = {}
+        evidence |= {key: rows for key, rows in more.items() if rows}
         if own := trace.scenario.ugv_controller:
-            by_steps["own_controller"] = f"{own.kind} is judged by its steps, not by what it was built with"
+            evidence["own_controller"] = f"{own.kind} is judged by its steps, not by what it was built with"
         return Finding(
             "refuted" if first else "holds",
             margin=shown.get("margin"),
@@ -228,9 +212,7 @@ class SafeHyp(TraceClaim):
             quantity="distance promised less the safe one" if name == AVOIDANCE else f"least slack of {name!r}",
             where={key: shown[key] for key in shown if key not in ("margin", "unit")},
             counterexample=_against(trace, first, broken) if first else None,
-            evidence=asdict(evidence)
-            | {key: [asdict(row) for row in rows] for key, rows in more.items() if rows}
-            | by_steps,
+            evidence=evidence,
             exercised=sum(binding.values()),
         )
 
@@ -530,42 +512,27 @@ def error_margins(trace: Trace, robot: str) -> Array:
     return np.array(margins)
 
 
-@dataclass(frozen=True)
-class LeastShare:
-    """The least share s that was left of a robot's command in a run, and the gain s A of its recoveries, 1/s."""
-
-    robot: str
-    share: float
-    gain_1_s: float
-
-
-def least_shares(trace: Trace) -> list[LeastShare]:
-    """Of each robot whose commands are shortened to what it can do; a command in full has the share 1."""
+def least_shares(trace: Trace) -> list[dict[str, Any]]:
+    """The least share s that was left of each command that is shortened, 1 in full, and the gain s A of recoveries."""
     gain = trace.scenario.control.avoidance_gain_1_s
     names = [ugv for ugv in trace.ugvs if trace.plant(ugv).steering is not None]
     shares = [float(trace.sampled(f"{name}.command_share").min()) for name in names]
-    return [LeastShare(name, share, share * gain) for name, share in zip(names, shares, strict=True)]
+    return [
+        {"robot": name, "share": share, "gain_1_s": share * gain} for name, share in zip(names, shares, strict=True)
+    ]
 
 
-@dataclass(frozen=True)
-class OwnPlant:
-    """The largest drift, m/s, and cover, m, of a robot with a user's plant in a run, and what is declared."""
-
-    robot: str
-    plant: str
-    drift_m_s: float
-    declared_drift_m_s: float
-    cover_m: float
-    declared_cover_m: float
-
-
-def own_plants(trace: Trace) -> list[OwnPlant]:
+def own_plants(trace: Trace) -> list[dict[str, Any]]:
+    """The largest drift and cover of each robot with a user's plant, and what is declared."""
     plants = []
     for name, robot in trace.scenario.robots.items():
         if measured := trace.plant(name).measured:
             drift, cover = (float(trace.sampled(f"{name}.{key}").max()) for key in measured)
             bounds, (keys,) = bounds_of(trace)[name], robot.plant
-            plants.append(OwnPlant(name, keys.kind, drift, bounds.drift_m_s, cover, bounds.cover_m))
+            plants.append({
+                "robot": name, "plant": keys.kind, "drift_m_s": drift, "declared_drift_m_s": bounds.drift_m_s,
+                "cover_m": cover, "declared_cover_m": bounds.cover_m,
+            })  # fmt: skip
     return plants
 
 

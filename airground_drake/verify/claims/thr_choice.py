@@ -1,7 +1,7 @@
 """THR-CHOICE: whether the threshold in force is the right one for the scenario's own numbers, and for its runs."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.claims.thr_quality import drift_of
 from airground_drake.verify.claims.thr_root import ThrRoot, rule_of
-from airground_drake.verify.finding import Chart, Evidence, Finding
+from airground_drake.verify.finding import Chart, Finding
 from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.runs.triggers import task_error
 
@@ -24,34 +24,7 @@ POINTS = 200  # of the chart
 BEYOND = 1.6  # length of its axis, relative to the largest mark
 DIGITS = 12  # decimals of a difference of risks: it is rounded in floating point
 
-
-@dataclass(frozen=True)
-class Measured(Evidence):
-    """Drift and noise of a UGV whose task error reached the threshold in a run, and what they say of the threshold."""
-
-    # The optimum, m, is that for this drift and this noise, 0 without noise. The extra risk is that of the threshold in
-    # force, m, against this optimum, with the scenario's c1 and c2.
-
-    drift_m_s: float
-    noise_m_sqrt_s: float
-    threshold_m: float
-    optimum_m: float
-    extra_risk: float
-
-
-@dataclass(frozen=True)
-class ThresholdChoice(Evidence):
-    """Thresholds, m, their Bayes risks, and what was measured in the runs of a report, by `run UGV`."""
-
-    kind: str
-    rule: str
-    threshold_in_force_m: float
-    optimal_threshold_m: float
-    threshold_as_printed_in_19_m: float
-    risk_in_force: float
-    least_risk: float
-    extra_risk: float
-    runs: dict[str, Measured] | None = None
+Row = dict[str, float]
 
 
 class ThrChoice(ModelClaim):
@@ -90,17 +63,16 @@ class ThrChoice(ModelClaim):
         least, risk = (float(bayes_risk(at, *numbers)) for at in (optimum, zeta))
         off = abs(zeta - optimum)
         optimal = off <= EQUAL * optimum
-        evidence = ThresholdChoice(
-            kind="optimal" if optimal else "declared",
-            rule=inputs["rule"],
-            threshold_in_force_m=zeta,
-            optimal_threshold_m=optimum,
-            threshold_as_printed_in_19_m=float(printed_threshold(*numbers)),
-            risk_in_force=risk,
-            least_risk=least,
-            extra_risk=max(round(risk - least, DIGITS), 0.0),
-        )
-        shown = {key: value for key, value in asdict(evidence).items() if value is not None}
+        evidence = {
+            "kind": "optimal" if optimal else "declared",
+            "rule": inputs["rule"],
+            "threshold_in_force_m": zeta,
+            "optimal_threshold_m": optimum,
+            "threshold_as_printed_in_19_m": float(printed_threshold(*numbers)),
+            "risk_in_force": risk,
+            "least_risk": least,
+            "extra_risk": max(round(risk - least, DIGITS), 0.0),
+        }
         chart = _chart(evidence, numbers)
         if not optimal and inputs["rule"] != "bayes":
             return Finding("holds", evidence=evidence, exercised=0, figure=chart)
@@ -109,13 +81,13 @@ class ThrChoice(ModelClaim):
             margin=EQUAL * optimum - off,
             unit="m",
             quantity="tolerance left between threshold and optimum",
-            counterexample=None if optimal else shown,
+            counterexample=None if optimal else evidence,
             evidence=evidence,
             exercised=1,
             figure=chart,
         )
 
-    def seen_in(self, trace: Trace) -> dict[str, Measured]:
+    def seen_in(self, trace: Trace) -> dict[str, Row]:
         """What the drift and the noise of UGVs say whose task error grew to the threshold, by `run UGV`."""
         decision, zeta = trace.scenario.decision, float(trace.meta["zeta_m"])
         drifts = {ugv: drift_of(task_error(trace, ugv), zeta) for ugv in trace.ugvs}
@@ -125,19 +97,19 @@ class ThrChoice(ModelClaim):
             if drift is not None
         }
 
-    def with_runs(self, finding: Finding, seen: Sequence[dict[str, Measured]]) -> Finding:
-        if not isinstance(finding.evidence, ThresholdChoice):
+    def with_runs(self, finding: Finding, seen: Sequence[dict[str, Row]]) -> Finding:
+        if not (isinstance(finding.evidence, dict) and "extra_risk" in finding.evidence):
             return finding
         runs = {name: row for of_run in seen for name, row in of_run.items()}
-        return replace(finding, evidence=replace(finding.evidence, runs=runs))
+        return replace(finding, evidence=finding.evidence | {"runs": runs})
 
 
-def _chart(evidence: ThresholdChoice, numbers: Sequence[float]) -> Chart:
+def _chart(evidence: dict[str, Any], numbers: Sequence[float]) -> Chart:
     """The Bayes risk over the threshold; the threshold in force, the optimal one, and that by (19) as printed."""
     places = {
-        "in force": evidence.threshold_in_force_m,
-        "optimal": evidence.optimal_threshold_m,
-        "(19) as printed": evidence.threshold_as_printed_in_19_m,
+        "in force": evidence["threshold_in_force_m"],
+        "optimal": evidence["optimal_threshold_m"],
+        "(19) as printed": evidence["threshold_as_printed_in_19_m"],
     }
     zeta = np.linspace(0.0, BEYOND * max(places.values()), POINTS + 1)[1:]
     drift, noise, *_ = numbers
@@ -147,16 +119,20 @@ def _chart(evidence: ThresholdChoice, numbers: Sequence[float]) -> Chart:
         "Bayes risk",
         {"risk (16)": (zeta, np.array([bayes_risk(at, *numbers) for at in zeta]))},
         {name: (at, float(bayes_risk(at, *numbers))) for name, at in places.items()},
-        caption=f"The threshold in force is {evidence.threshold_in_force_m:.4g} m ({evidence.kind}). The curve assumes "
+        caption=f"The threshold in force is {places['in force']:.4g} m ({evidence['kind']}). The curve assumes "
         f"a drift of {drift:g} m/s and a noise of {noise:g} m/√s.",
     )
 
 
-def measured(zeta: float, drift: float, noise: float, rule: Threshold) -> Measured:
+def measured(zeta: float, drift: float, noise: float, rule: Threshold) -> Row:
     """What a drift, m/s, positive, and a noise, m/sqrt(s), say of a threshold, m, with the costs of a rule."""
     optimum, extra = 0.0, rule.c1_1_s * zeta / drift  # without noise: decided after zeta / drift, never wrongly
     if noise > 0.0:
         numbers = drift, noise, rule.c1_1_s, rule.c2
         optimum = optimal_threshold(*numbers)
         extra = max(round(float(bayes_risk(zeta, *numbers) - bayes_risk(optimum, *numbers)), DIGITS), 0.0)
-    return Measured(drift, noise, zeta, optimum, extra)
+    return {
+        "drift_m_s": drift, "noise_m_sqrt_s": noise, "threshold_m": zeta,
+        "optimum_m": optimum,  # for this drift and this noise; 0 without noise
+        "extra_risk": extra,  # of the threshold in force against this optimum, with the scenario's c1 and c2
+    }  # fmt: skip

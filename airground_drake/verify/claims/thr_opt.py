@@ -1,6 +1,5 @@
 """THR-OPT: the Bayes threshold as the minimiser of the Bayes risk (16) (coq/Threshold.v)."""
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -10,18 +9,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.claims.thr_root import ThrRoot, as_floats, rule_of, two_signs
 from airground_drake.verify.engines.signs import RootInterval, ThresholdRule, ball, enclose, sign, value
 from airground_drake.verify.model.levels import NUMBERS
-from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
-
-
-@dataclass(frozen=True, kw_only=True)
-class Optimum(Proof):
-    """Where both roots are, for which drifts the threshold in force is optimal, and the risks."""
-
-    enclosures: dict[str, list[float]]  # of both roots, as u and as a threshold, m
-    optimal_for_drifts_m_s: list[list[float]]  # enclosures of the drifts, m/s
-    threshold_in_force_m: float
-    risk_at_the_root: float  # Bayes risk
-    risk_at_the_threshold_in_force: float  # Bayes risk
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 
 class ThrOpt(TheoremClaim):
@@ -76,18 +64,17 @@ class ThrOpt(TheoremClaim):
             Hypothesis.of(self.margin_of, "the risk at the printed root is higher", _gap(rule, printed), strict=True),
         ]
 
-    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Optimum:
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
         rule, zeta = rule_of(inputs), inputs["zeta_m"]
         root, printed = rule.root, rule.printed_root
         numbers = [inputs[name] for name in NUMBERS]
-        return Optimum(
-            enclosures={**as_floats(rule, root), **as_floats(rule, printed, "printed_")},
-            optimal_for_drifts_m_s=_drifts(rule, decimal(zeta)),
-            threshold_in_force_m=zeta,
-            risk_at_the_root=float(bayes_risk(float(rule.zeta(root.low)), *numbers)),
-            risk_at_the_threshold_in_force=float(bayes_risk(zeta, *numbers)),
-            **proof,
-        )
+        return {
+            "enclosures": as_floats(rule, root) | as_floats(rule, printed, "printed_"),
+            "optimal_for_drifts_m_s": _drifts(rule, decimal(zeta)),
+            "threshold_in_force_m": zeta,
+            "risk_at_the_root": float(bayes_risk(float(rule.zeta(root.low)), *numbers)),
+            "risk_at_the_threshold_in_force": float(bayes_risk(zeta, *numbers)),
+        }
 
 
 def _gap(rule: ThresholdRule, printed: RootInterval) -> Fraction:

@@ -28,7 +28,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.claims.thr_trig import EVENT_TOLERANCE_S, levels_of
 from airground_drake.verify.engines.geometry import NormSignal
-from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.triggers import Transition, recorded_events, task_error
 
 # The drift of a run is the growth of the task error over this time before it first reaches the threshold, s.
@@ -45,32 +45,6 @@ class Decided:
     error_m: float  # task error then; at its largest for a missed excursion, m
     off_m: float  # how far the error was from the threshold: below it at the trigger, or above it before the trigger, m
     late_s: float | None  # time since the error reached the threshold, s; negative: until then; None: it did not
-
-
-@dataclass(frozen=True)
-class Ddm(Evidence):
-    """A UGV's decisions beside (17)-(18) for the drift and the noise of the run."""
-
-    drift_m_s: float  # growth of the task error in the last second before it first reached the threshold
-    noise_m_sqrt_s: float  # of the run
-    error_rate: float | None  # share of false triggers and missed excursions in all decisions; None without any
-    error_rate_of_18: float  # the probability (18)
-    decision_time_s: float | None  # mean of zeta / drift + late_s; None if no lateness is known
-    decision_time_of_17_s: float  # the mean (17)
-    decision_time_without_noise_s: float  # zeta / drift
-
-
-@dataclass(frozen=True)
-class Quality:
-    """The evidence: levels, m; how many decisions of each kind; all of them; the DDM of each UGV that has a drift."""
-
-    zeta_m: float
-    tolerance_m: float
-    counts: dict[str, int]
-    latest: Decided | None
-    earliest: Decided | None
-    decisions: list[Decided]
-    ddm: dict[str, Ddm]
 
 
 class ThrQuality(TraceClaim):
@@ -115,7 +89,7 @@ class ThrQuality(TraceClaim):
         zeta, release, dwell = levels_of(trace)
         tolerance = zeta - release if release < zeta else zeta / 2.0
         decisions: list[Decided] = []
-        ddm: dict[str, Ddm] = {}
+        ddm: dict[str, dict[str, float | None]] = {}
         for ugv in trace.ugvs:
             e = task_error(trace, ugv)
             judge = Judge(ugv, e, zeta, release, tolerance)
@@ -128,15 +102,15 @@ class ThrQuality(TraceClaim):
         timed = [(decided.late_s, k) for k, decided in enumerate(decisions)
                  if decided.late_s is not None and decided.kind != "missed"]  # fmt: skip
         latest, earliest = max(timed, default=(0.0, 0)), min(timed, default=(0.0, 0))
-        evidence = Quality(
-            zeta_m=zeta,
-            tolerance_m=tolerance,
-            counts={kind: counts[kind] for kind in ("served", "early", "false", "missed")},
-            latest=decisions[latest[1]] if latest[0] > EVENT_TOLERANCE_S else None,
-            earliest=decisions[earliest[1]] if earliest[0] < -EVENT_TOLERANCE_S else None,
-            decisions=decisions,
-            ddm=ddm,
-        )
+        evidence = {
+            "zeta_m": zeta,
+            "tolerance_m": tolerance,
+            "counts": {kind: counts[kind] for kind in ("served", "early", "false", "missed")},
+            "latest": decisions[latest[1]] if latest[0] > EVENT_TOLERANCE_S else None,
+            "earliest": decisions[earliest[1]] if earliest[0] < -EVENT_TOLERANCE_S else None,
+            "decisions": decisions,
+            "ddm": ddm,
+        }
         if not decisions:
             return Finding("holds", evidence=evidence, exercised=0)
         worst = max(decisions, key=lambda decided: decided.off_m)
@@ -249,18 +223,18 @@ def drift_of(e: NormSignal, zeta: float) -> float | None:
     return grown / (reached - begin) if grown > 0.0 else None
 
 
-def _ddm(decisions: Sequence[Decided], zeta: float, drift: float, noise: float) -> Ddm:
+def _ddm(decisions: Sequence[Decided], zeta: float, drift: float, noise: float) -> dict[str, float | None]:
     """The decisions about a UGV beside (17)-(18), without initial deviation."""
     alone = zeta / drift
     scale = alone * (drift / noise) ** 2 if noise > 0.0 else math.inf
     late = [decided.late_s for decided in decisions if decided.late_s is not None and decided.kind != "missed"]
     wrong = sum(decided.kind in ("false", "missed") for decided in decisions)
-    return Ddm(
-        drift_m_s=drift,
-        noise_m_sqrt_s=noise,
-        error_rate=wrong / len(decisions) if decisions else None,
-        error_rate_of_18=0.5 * (1.0 - math.tanh(scale)),
-        decision_time_s=alone + sum(late) / len(late) if late else None,
-        decision_time_of_17_s=alone * math.tanh(scale),
-        decision_time_without_noise_s=alone,
-    )
+    return {
+        "drift_m_s": drift,
+        "noise_m_sqrt_s": noise,
+        "error_rate": wrong / len(decisions) if decisions else None,
+        "error_rate_of_18": 0.5 * (1.0 - math.tanh(scale)),
+        "decision_time_s": alone + sum(late) / len(late) if late else None,  # None: no lateness is known
+        "decision_time_of_17_s": alone * math.tanh(scale),
+        "decision_time_without_noise_s": alone,
+    }

@@ -1,6 +1,5 @@
 """THR-ROOT: the Bayes threshold as the one root of (19) (coq/Threshold.v), enclosed by two signs."""
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -9,18 +8,10 @@ from airground_drake.model.trigger.bayes import optimal_threshold
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.engines.signs import RootInterval, ThresholdRule, value
 from airground_drake.verify.model.levels import NUMBERS, threshold_m
-from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 # The program's threshold may be this far outside its enclosure, relative to it: rounding errs by some 1e-15.
 FLOAT_TOLERANCE = Fraction(1, 10**12)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Root(Proof):
-    """The root, as u and as a threshold, m, and the threshold that the program computes, m."""
-
-    enclosures: dict[str, list[float]]
-    computed_threshold_m: float
 
 
 class ThrRoot(TheoremClaim):
@@ -72,9 +63,9 @@ class ThrRoot(TheoremClaim):
             Hypothesis.of(self.margin_of, says, FLOAT_TOLERANCE * high - outside, "m"),
         ]
 
-    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Root:
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
         rule = rule_of(inputs)
-        return Root(enclosures=as_floats(rule, rule.root), computed_threshold_m=self.computed(inputs), **proof)
+        return {"enclosures": as_floats(rule, rule.root), "computed_threshold_m": self.computed(inputs)}
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         if broken.hypothesis != self.margin_of:

@@ -140,7 +140,7 @@ def isolation(noise_period_s: float, period_s: float, levels: TriggerLevels) -> 
         Hypothesis.of("control periods in a noise period", "there is at least one", steps - 1),
     ]
     ground = grounds(ThrTrig.theorems, hypotheses)
-    return {"isolation": ground["reason"] or ground["proof"], "hypotheses": hypotheses}
+    return {"isolation": ground.get("reason", ground["proof"]), "hypotheses": hypotheses}
 
 
 class TriggerLevels(NamedTuple):

@@ -1,23 +1,14 @@
 """ZENO-PROOF: two triggers are never closer than the minimum inter-event time (coq/Trigger.v)."""
 
-from dataclasses import dataclass
 from typing import Any
 
 from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.model.levels import levels_of, trigger_of
-from airground_drake.verify.model.theorem import Hypothesis, Proof, TheoremClaim
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 # The bound to refute if the scenario declares 0 s, s. Any number would do: the counterexample scales with it.
 SHORTEST_S = 1e-3
-
-
-@dataclass(frozen=True, kw_only=True)
-class Dwell(Proof):
-    """The least time between two triggers, s, and how many a run can have at most; None without a dwell."""
-
-    bound_s: float
-    most_triggers: int | None
 
 
 class ZenoProof(TheoremClaim):
@@ -71,10 +62,10 @@ class ZenoProof(TheoremClaim):
             Hypothesis.of("threshold less release", "the release level is at most the threshold", zeta - release, "m"),
         ]
 
-    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Dwell:
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
         dwell = decimal(inputs["dwell_s"])
         most = int(decimal(inputs["duration_s"]) // dwell) + 1 if dwell > 0 else None
-        return Dwell(bound_s=inputs["min_inter_event_s"] or SHORTEST_S, most_triggers=most, **proof)
+        return {"bound_s": inputs["min_inter_event_s"] or SHORTEST_S, "most_triggers": most}
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """Two triggers closer than the bound, on a run of the automaton: up, down and up again."""

@@ -27,29 +27,23 @@ class Hypothesis(Evidence):
         return cls(name, says, float(margin), unit, margin > 0 if strict else margin >= 0)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Proof(Evidence):
-    """The evidence of a theorem."""
-
-    proof: str  # whether Coq has checked the theorems, in words
-    theorems: dict[str, str]  # what they say, by name
-    hypotheses: Sequence[Hypothesis]  # those that were checked
-    reason: str | None = None  # why the claim is left open
-    applies_to: int | None = None  # how often the runs of a report met the premise, `of` how many times
-    of: int | None = None
-
-
 def grounds(theorems: Sequence[str], hypotheses: Sequence[Hypothesis]) -> dict[str, Any]:
-    """The fields of a `Proof`; `reason` says why the theorems prove nothing here, and is None if they do."""
+    """The evidence of theorems; `reason` says why they prove nothing here, and is left out if they do."""
     stands = standing(*theorems)
     broken = next((hypothesis for hypothesis in hypotheses if not hypothesis.holds), None)
-    reason = None if stands.checked else f"the theorems are {stands.words}"
-    return {
+    evidence = {
         "proof": stands.words,
         "theorems": {name: THEOREMS[name].statement for name in theorems},
         "hypotheses": hypotheses,
-        "reason": reason if broken is None else f"a hypothesis fails: {broken.says}",
     }
+    if broken is not None:
+        return evidence | {"reason": f"a hypothesis fails: {broken.says}"}
+    return evidence if stands.checked else evidence | {"reason": f"the theorems are {stands.words}"}
+
+
+def is_proof(evidence: Any) -> bool:
+    """Whether evidence is that of theorems, not a failure's."""
+    return isinstance(evidence, dict) and "proof" in evidence
 
 
 class TheoremClaim(ModelClaim):
@@ -66,15 +60,16 @@ class TheoremClaim(ModelClaim):
     def hypotheses(self, inputs: dict[str, Any]) -> Sequence[Hypothesis]:
         """The hypotheses of the theorems, for these constants."""
 
-    def evidence(self, inputs: dict[str, Any], **proof: Any) -> Proof:
-        return Proof(**proof)
+    def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
+        """Further entries of the evidence."""
+        return {}
 
     def with_runs(self, finding: Finding, seen: Sequence[tuple[int, int]]) -> Finding:
         """Add how often the runs met the premise, of how many times: a theorem that never applies protects nothing."""
-        if not seen or not isinstance(finding.evidence, Proof):
+        if not seen or not is_proof(finding.evidence):
             return finding
         met, cases = (sum(column) for column in zip(*seen, strict=True))
-        return replace(finding, evidence=replace(finding.evidence, applies_to=met, of=cases))
+        return replace(finding, evidence=finding.evidence | {"applies_to": met, "of": cases})
 
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """A case that refutes the claim if this hypothesis fails; None: the claim is only left open."""
@@ -85,11 +80,12 @@ class TheoremClaim(ModelClaim):
         broken = [hypothesis for hypothesis in hypotheses if not hypothesis.holds]
         named = [hypothesis for hypothesis in hypotheses if hypothesis.hypothesis == self.margin_of]
         shown = broken[0] if broken else min(named, key=lambda hypothesis: hypothesis.margin)
-        evidence = self.evidence(inputs, **grounds(self.theorems, hypotheses))
+        evidence = grounds(self.theorems, hypotheses) | self.numbers(inputs)
         finding = Finding(
             "proved", shown.margin, shown.unit, evidence=evidence, quantity=shown.hypothesis, exercised=len(hypotheses)
         )
         against = self.counterexample(inputs, shown) if broken else None
         if against is not None:
-            return replace(finding, status="refuted", counterexample=against, evidence=replace(evidence, reason=None))
-        return finding if evidence.reason is None else replace(finding, status="inconclusive")
+            evidence.pop("reason")
+            return replace(finding, status="refuted", counterexample=against)
+        return replace(finding, status="inconclusive") if "reason" in evidence else finding

@@ -4,9 +4,8 @@ A robot keeps n.v >= -(D - d - V h) / h, and n.v >= 0 where D < d + V h: it is *
 of min(D, d + V h), the obstacle has moved itself.
 """
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -124,53 +123,30 @@ def speeds(trace: Trace) -> dict[str, Array]:
     return mean
 
 
-@dataclass(frozen=True)
-class BesideMoving:
-    """A robot beside an obstacle that may move, in numbers of control periods."""
-
-    # `kept_periods`: all hypotheses were met, so that the distance is proved whatever the obstacle does within its
-    # declared speed. In the `passive_periods` it was too near for that, and the robot did not bring itself nearer; in
-    # `standing_periods` of these it stood. In `retreating_periods` it retreated so fast that it would have kept the
-    # distance, and all that it lost is the obstacle's motion above its declared speed.
-
-    first: str
-    second: str
-    safe_distance_m: float
-    declared_m_s: float
-    fastest_m_s: float
-    too_fast_s: float | None
-    too_fast_m_s: float | None
-    periods: int
-    kept_periods: int
-    passive_periods: int
-    retreating_periods: int
-    standing_periods: int
-    e_m: float
-
-
-def beside_moving(trace: Trace) -> list[BesideMoving]:
-    """Each robot beside each obstacle that may move."""
-    rows, fast = list[BesideMoving](), speeds(trace)
+def beside_moving(trace: Trace) -> list[dict[str, Any]]:
+    """Each robot beside each obstacle that may move, in numbers of control periods."""
+    rows, fast = list[dict[str, Any]](), speeds(trace)
     slop = DISTANCE_TOLERANCE_M / trace.scenario.control.period_s
     for periods in beside(trace):
         pair = periods.pair
         speed = fast.get(pair.second, np.zeros(1))
         over = np.flatnonzero(speed > pair.speed_m_s + slop)
-        rows.append(
-            BesideMoving(
-                first=pair.first,
-                second=pair.second,
-                safe_distance_m=pair.required_m,
-                declared_m_s=pair.speed_m_s,
-                fastest_m_s=float(speed.max()),
-                too_fast_s=float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
-                too_fast_m_s=float(speed[over[0]]) if len(over) else None,
-                periods=len(periods.row),
-                kept_periods=int(periods.kept.sum()),
-                passive_periods=int(periods.passive.sum()),
-                retreating_periods=int(periods.retreated.sum()),
-                standing_periods=int(periods.stood.sum()),
-                e_m=float(periods.missed_m.max(initial=0.0)),
-            )
-        )
+        rows.append({
+            "first": pair.first,
+            "second": pair.second,
+            "safe_distance_m": pair.required_m,
+            "declared_m_s": pair.speed_m_s,
+            "fastest_m_s": float(speed.max()),
+            "too_fast_s": float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
+            "too_fast_m_s": float(speed[over[0]]) if len(over) else None,
+            "periods": len(periods.row),
+            # all hypotheses were met: the distance is proved whatever the obstacle does within its declared speed
+            "kept_periods": int(periods.kept.sum()),
+            # too near for that: the robot did not bring itself nearer
+            "passive_periods": int(periods.passive.sum()),
+            # of these: so fast that all that was lost is the obstacle's motion above its declared speed
+            "retreating_periods": int(periods.retreated.sum()),
+            "standing_periods": int(periods.stood.sum()),
+            "e_m": float(periods.missed_m.max(initial=0.0)),
+        })  # fmt: skip
     return rows

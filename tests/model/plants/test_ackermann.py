@@ -56,7 +56,7 @@ def test_a_car_passes_a_rock_and_keeps_its_distance() -> None:
     assert safety.safe_hyp(run).status == safety.safe_trace(run).status == "holds"
     (proof,) = judge_model(trace.scenario, claims=["SAFE-BUDGET"])
     assert proof.status == "proved"
-    assert {"Turning.car", "Plants.forwards"} <= proof.evidence.theorems.keys()
+    assert {"Turning.car", "Plants.forwards"} <= proof.evidence["theorems"].keys()
 
 
 def test_a_car_stands_where_it_would_have_to_turn_on_the_spot() -> None:

@@ -105,7 +105,7 @@ def test_the_model_says_what_the_budget_needs() -> None:
     scenario = crossing(errors="away")
     (verdict,) = judge_model(scenario, claims=["SAFE-BUDGET"])
     assert verdict.status == "proved"
-    assert "Budget.one_stands" in verdict.evidence.theorems
+    assert "Budget.one_stands" in verdict.evidence["theorems"]
     terms = {pair.kind: (pair.gap_m - pair.promised_m, [term.key for term in pair.terms]) for pair in budget(scenario)}
     assert terms["ugv"] == (pytest.approx(0.1083, abs=5e-5), ["position_error_m"])
     assert terms["obstacle"] == (pytest.approx(0.0514, abs=5e-5), ["position_error_m"])

@@ -34,9 +34,9 @@ def test_shipped_scenarios_meet_all_hypotheses(scenario: str) -> None:
         assert json.loads(json.dumps(inputs, allow_nan=False)) == inputs
         finding = claim.judge(inputs)
         assert finding.status == "proved", (claim.id, finding)
-        assert finding.exercised == len(finding.evidence.hypotheses) > 0
-        assert all(each.holds for each in finding.evidence.hypotheses)
-        assert finding.evidence.theorems == {each: THEOREMS[each].statement for each in claim.theorems}
+        assert finding.exercised == len(finding.evidence["hypotheses"]) > 0
+        assert all(each.holds for each in finding.evidence["hypotheses"])
+        assert finding.evidence["theorems"] == {each: THEOREMS[each].statement for each in claim.theorems}
         assert "reason" not in finding.to_json()["evidence"]
 
 
@@ -79,7 +79,7 @@ def test_a_hypothesis_that_fails_leaves_the_claim_open(names: list[str], change:
         finding = CLAIMS[name].judge(INPUTS[name] | change)
         assert finding.status == status, finding
         if status == "inconclusive":
-            assert finding.evidence.reason.startswith("a hypothesis fails: ")
+            assert finding.evidence["reason"].startswith("a hypothesis fails: ")
             assert finding.margin is not None
             assert finding.margin <= 0.0
 
@@ -124,9 +124,9 @@ def test_a_trigger_without_the_dwell_is_refuted_by_two_triggers(change: dict[str
 
 def test_numbers_that_follow() -> None:
     found = {name: claim.judge(INPUTS[name]).evidence for name, claim in CLAIMS.items()}
-    assert found["ZENO-PROOF"].most_triggers == 61
-    assert found["LIVE-WAIT"].bound_s == 5 * (30.0 + 0.05)
-    assert found["SAFE-DIST"].least_distances_m == {"obstacle": 1.75, "uav_ugv": 0.5, "ugv_ugv": 1.5}
+    assert found["ZENO-PROOF"]["most_triggers"] == 61
+    assert found["LIVE-WAIT"]["bound_s"] == 5 * (30.0 + 0.05)
+    assert found["SAFE-DIST"]["least_distances_m"] == {"obstacle": 1.75, "uav_ugv": 0.5, "ugv_ugv": 1.5}
     scenario = load("case_a", ["uav.radius_m=0.25", "obstacles.obstacle_1.radius_m=0.1"])
     safe = {(each["kind"], each["distance_m"]) for each in CLAIMS["SAFE-INV"].inputs(scenario)["pairs"]}
     assert {("obstacle", 2.35), ("obstacle", 2.0), ("uav_ugv", 1.25)} <= safe  # both radii: the farthest, the nearest
@@ -136,4 +136,7 @@ def test_a_disturbance_costs_twice_as_much_between_ugvs_that_may_stand() -> None
     claim = CLAIMS["SAFE-DIST"]
     known, lossy = (claim.inputs(load("crossing", [f"channel.ugvs.loss={loss}"])) for loss in (0.0, 0.1))
     usual, halved = (claim.judge(inputs | {"disturbance_m_s": 0.1}).evidence for inputs in (known, lossy))
-    assert halved.least_distances_m == {**usual.least_distances_m, "ugv_ugv": pytest.approx(1.0 - 4.0 * 0.1 / 3.0)}
+    assert halved["least_distances_m"] == {
+        **usual["least_distances_m"],
+        "ugv_ugv": pytest.approx(1.0 - 4.0 * 0.1 / 3.0),
+    }

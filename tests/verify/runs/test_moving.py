@@ -196,9 +196,9 @@ def test_safe_dist_counts_retreats_at_the_disturbance_and_at_that_and_the_person
     away = (normal * trace.chosen("ugv1")).sum(axis=1)[gap < D + H]
     w = found.inputs["disturbance_m_s"]
     counts = (
-        found.evidence.passive_periods,
-        found.evidence.passive_periods_w_h_once,
-        found.evidence.passive_periods_kept,
+        found.evidence["passive_periods"],
+        found.evidence["passive_periods_w_h_once"],
+        found.evidence["passive_periods_kept"],
     )
     assert counts == (len(away), (away >= w).sum(), (away >= w + 1.0).sum())
     assert 0 < counts[1] < counts[0]

@@ -32,7 +32,7 @@ def test_a_threshold_is_optimal_or_declared(
     name: str, changes: dict[str, Any], status: str, exercised: int, kind: str
 ) -> None:
     finding = ThrChoice().judge(INPUTS[name] | changes)
-    assert (finding.status, finding.exercised, finding.evidence.kind) == (status, exercised, kind)
+    assert (finding.status, finding.exercised, finding.evidence["kind"]) == (status, exercised, kind)
     assert (finding.margin is not None and finding.margin < 0.0) == (status == "refuted")
 
 
@@ -50,22 +50,22 @@ def test_shipped_scenarios(scenario: str, run: str, rule: str, in_force: float, 
     found = verdict.evidence
     assert verdict.as_expected
     assert verdict.expected == ("exercised" if rule == "bayes" else "holds")
-    assert (found.rule, found.kind) == (rule, "optimal" if rule == "bayes" else "declared")
-    assert found.threshold_in_force_m == pytest.approx(in_force, rel=1e-4)
-    assert found.extra_risk == pytest.approx(extra, rel=1e-3, abs=1e-12)
+    assert (found["rule"], found["kind"]) == (rule, "optimal" if rule == "bayes" else "declared")
+    assert found["threshold_in_force_m"] == pytest.approx(in_force, rel=1e-4)
+    assert found["extra_risk"] == pytest.approx(extra, rel=1e-3, abs=1e-12)
     if rule == "printed":
-        assert found.threshold_in_force_m == found.threshold_as_printed_in_19_m
+        assert found["threshold_in_force_m"] == found["threshold_as_printed_in_19_m"]
 
 
 def test_runs_show_the_drift_and_the_noise_that_they_had(run: Callable[[str, str], Trace]) -> None:
     found = ThrChoice().seen_in(run("case_a", "b"))["b ugv1"]
-    assert found.drift_m_s == pytest.approx(0.5606, abs=5e-4)
-    assert found.noise_m_sqrt_s == 0.004
-    assert found.optimum_m == pytest.approx(0.00016, abs=5e-6)
-    assert found.extra_risk == pytest.approx(0.5 * 3.0 / 0.5606, rel=1e-2)  # c1 times the time to reach 3 m
+    assert found["drift_m_s"] == pytest.approx(0.5606, abs=5e-4)
+    assert found["noise_m_sqrt_s"] == 0.004
+    assert found["optimum_m"] == pytest.approx(0.00016, abs=5e-6)
+    assert found["extra_risk"] == pytest.approx(0.5 * 3.0 / 0.5606, rel=1e-2)  # c1 times the time to reach 3 m
     quiet = ThrChoice().seen_in(with_scenario(run_of("d"), decision__noise_m_sqrt_s=0.0))["d ugv1"]
-    assert quiet.optimum_m == 0.0
-    assert quiet.extra_risk == pytest.approx(0.5 * 3.0 / quiet.drift_m_s)
+    assert quiet["optimum_m"] == 0.0
+    assert quiet["extra_risk"] == pytest.approx(0.5 * 3.0 / quiet["drift_m_s"])
 
 
 @pytest.mark.parametrize(("kind", "shown"), [("declared", "declared"), ("optimal", "holds")])

@@ -23,7 +23,7 @@ def test_root_and_optimum_are_proved_and_agree_with_mpmath_and_a_grid(name: str)
     assert root.status == optimum.status == "proved", (root, optimum)
     assert root.margin is not None
     assert root.margin > 0.0
-    enclosures = optimum.evidence.enclosures
+    enclosures = optimum.evidence["enclosures"]
     with mpmath.workdps(40):
         a, s, c1, c2 = (mpmath.mpf(repr(inputs[key])) for key in NUMBERS)
         for key, ratio in (("zeta_m", c2 / c1), ("printed_zeta_m", c1 / c2)):
@@ -33,7 +33,7 @@ def test_root_and_optimum_are_proved_and_agree_with_mpmath_and_a_grid(name: str)
                 (low, high * 1.001),
             )
             assert low * (1 - 1e-15) < exact < high * (1 + 1e-15)
-    constants, zeta = [inputs[key] for key in NUMBERS], root.evidence.computed_threshold_m
+    constants, zeta = [inputs[key] for key in NUMBERS], root.evidence["computed_threshold_m"]
     best = bayes_risk(zeta, *constants)
     assert all(bayes_risk(z, *constants) > best for z in zeta * np.geomspace(1e-3, 20.0, 200))
     worse = bayes_risk(enclosures["printed_zeta_m"][0], *constants) - bayes_risk(enclosures["zeta_m"][0], *constants)
@@ -77,12 +77,12 @@ def test_the_tolerance_of_the_program_is_a_trillionth(
 
 def test_table_1_is_optimal_for_two_drifts_and_30_m_for_none() -> None:
     """For about 6.07 m/s, and one beyond any robot here."""
-    low, high = ThrOpt().judge(TABLE_1).evidence.optimal_for_drifts_m_s
+    low, high = ThrOpt().judge(TABLE_1).evidence["optimal_for_drifts_m_s"]
     assert (low[0], high[0]) == (pytest.approx(6.0667, abs=1e-4), pytest.approx(99.015, abs=1e-3))
     for drift in (low[0], high[0]):
         assert optimal_threshold(drift, 10.0, 0.5, 1.0) == pytest.approx(3.0, rel=1e-9)
     finding = ThrOpt().judge(TABLE_1 | {"zeta_m": 30.0})
-    assert (finding.status, finding.evidence.optimal_for_drifts_m_s) == ("proved", [])
+    assert (finding.status, finding.evidence["optimal_for_drifts_m_s"]) == ("proved", [])
     assert all(optimal_threshold(drift, 10.0, 0.5, 1.0) < 30.0 for drift in np.geomspace(1e-3, 1e3, 100))
 
 
