@@ -69,7 +69,7 @@ class Batch:
             if not isinstance(body.plant, FirstOrder | Unicycle | Lag | Delay | Scripted):
                 raise LeftToDrakeError(f"the plant of {body.name}")
         (flown_by, uav), *more = given.aerial.items()
-        left: dict[str, object] = {
+        left = {
             "errors of measured positions": given.sensing is not None,
             "faults": given.faults is not None,
             "a channel": given.channel is not None and method.intervenes,
@@ -79,8 +79,9 @@ class Batch:
             "a gatekeeper with a limit by the clock": given.gatekeeper.budget == "wall_clock" and method.gated,
             f"the controller {given.ugv_controller and given.ugv_controller.kind} of the UGVs": given.ugv_controller,
         }
-        for why in (why for why, applies in left.items() if applies):
-            raise LeftToDrakeError(why)
+        reasons = [why for why, applies in left.items() if applies]
+        if reasons:
+            raise LeftToDrakeError(reasons[0])
         if UAV_TASKS.load(uav.task, of=Task) is not FormationTask:
             raise LeftToDrakeError(f"the task {uav.task} of the UAV")
         presets = components.make_presets(given)
