@@ -16,8 +16,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
-
 from airground_drake.base import files
 from airground_drake.base.registry import MODEL_CLAIMS
 from airground_drake.base.statuses import PASSING
@@ -84,9 +82,8 @@ def _read(path: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding |
         made, digest = entry.pop("finding"), entry.pop("sha256")
         sound = digest == _digest(made) and made["status"] in PASSING
         about = json.dumps(entry, sort_keys=True) == json.dumps(content(claim, inputs), sort_keys=True)
-        evidence = TypeAdapter(claim.record).validate_python(made["evidence"])
         figure = Chart(**made["figure"]) if made["figure"] else None
-        finding = Finding(**made | {"evidence": evidence, "figure": figure, "from_cache": True})
+        finding = Finding(**made | {"figure": figure, "from_cache": True})
     except (OSError, ValueError, TypeError, AttributeError, KeyError, RecursionError):
         return None
     return finding if sound and about else None

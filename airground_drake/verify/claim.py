@@ -19,7 +19,7 @@ from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outc
 from airground_drake.model.bodies import motion
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.finding import Chart, Evidence, Failure, Finding
+from airground_drake.verify.finding import Chart, Failure, Finding
 
 __all__ = [
     "Claim",
@@ -116,12 +116,10 @@ class ModelClaim(Claim):
     `check` sees nothing but `inputs`. So equal inputs and equal code give equal findings, and the cache can keep them.
 
     Attributes (all of the class):
-        record: type of the evidence; the cache needs it to read a finding back.
         kept: whether the cache keeps its findings, as of an experiment that takes seconds; only of this package's.
     """
 
     expected: Status = "proved"
-    record: type[Evidence] = Evidence
     kept = False
 
     @abc.abstractmethod

@@ -15,15 +15,7 @@ PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """Numbers behind a verdict. Each claim adds its own fields, which are the keys in report.json.
-
-    A field whose default is None is left out of report.json while it is None.
-    """
-
-
-@dataclass(frozen=True)
-class Failure(Evidence):
+class Failure:
     """Why a claim could not be decided."""
 
     error: str
@@ -73,7 +65,8 @@ class Finding:
         unit: unit of the margin.
         where: where the margin is attained: robot, obstacle, time and the like.
         counterexample: for `refuted`: enough to reproduce it by hand.
-        evidence: numbers behind the verdict: the claim's own `Evidence`, or a dict of strict JSON.
+        evidence: numbers behind the verdict, a dict: its keys are those in report.json, its values strict JSON, arrays
+            and dataclasses. A `Failure` if the claim could not be decided.
         quantity: what the margin is of, in a few words.
         exercised: how often the claim was put to the test, in what its `exercised_by` counts; 0: nothing could have
             refuted it; None: not counted.
@@ -86,7 +79,7 @@ class Finding:
     unit: str = ""
     where: dict[str, Any] = field(default_factory=dict)
     counterexample: dict[str, Any] | None = None
-    evidence: Any = Evidence()
+    evidence: Any = field(default_factory=dict)
     quantity: str = ""
     exercised: int | None = None
     figure: Chart | None = None
@@ -99,9 +92,7 @@ class Finding:
 
 def _in_json(value: Any) -> Any:
     if is_dataclass(value):
-        given = {column.name: getattr(value, column.name) for column in fields(value)}
-        optional = {column.name for column in fields(value) if column.default is None}
-        return {key: _in_json(item) for key, item in given.items() if item is not None or key not in optional}
+        return {column.name: _in_json(getattr(value, column.name)) for column in fields(value)}
     if isinstance(value, Mapping):
         return {key: _in_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +14,14 @@ from airground_drake.base import files
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify import cache
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.finding import Finding
 
-
-@dataclass(frozen=True)
-class Noted(Evidence):
-    runs: dict[str, list[float]]
-
-
-FOUND = Finding("proved", margin=2.0, exercised=1, evidence=Noted({"a": [1.0]}))
+FOUND = Finding("proved", margin=2.0, exercised=1, evidence={"runs": {"a": [1.0]}})
 
 
 class Counting(ModelClaim):
     id, statement, formula, method, equations = "THR-DDM", "s", "f", "m", "e"
-    assumptions, does_not_establish, record, kept = (), "n", Noted, True
+    assumptions, does_not_establish, kept = (), "n", True
 
     def __init__(self, found: Finding | Exception = FOUND) -> None:
         self.found, self.calls = found, 0
@@ -80,7 +74,6 @@ UNUSABLE: dict[str, bytes] = {
     "a margin of NaN": entry(margin=float("nan")),
     "an infinite margin": entry().replace(b"1.0", b"1e999"),
     "a field too many": entry(more=1),
-    "evidence of another claim": entry(evidence={"runs": 3}),
     "a flipped bit": entry().replace(b'"margin": 1.0', b'"margin": 3.0'),
     "a refutation": entry(status="refuted", counterexample={"x": 1}),
     "another claim": entry().replace(b"THR-DDM", b"ANOTHER"),

@@ -23,7 +23,7 @@ from scipy.special import betainccinv, betaincinv, ndtri
 from airground_drake.model.trigger.bayes import decision_time, error_rate, optimal_threshold
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.levels import NUMBERS
 
 LEVEL = 0.99
@@ -120,33 +120,6 @@ def simulate(experiment: PassageExperiment) -> PassageSample:
 Formulas = Callable[[PassageExperiment], tuple[float, float]]
 
 
-@dataclass(frozen=True)
-class Comparison(Evidence):
-    """A simulated mean, its interval and the formula's value; the margin is in half-widths of the interval."""
-
-    experiment: str
-    quantity: str
-    unit: str
-    constants: dict[str, Any]
-    wrong_decisions: int
-    periods_sum: int
-    periods_sum_of_squares: int
-    estimate: float
-    interval: list[float]
-    formula: float
-    z_score: float
-    margin: float
-
-
-@dataclass(frozen=True)
-class Comparisons(Evidence):
-    """All comparisons, the number of paths and the simultaneous level of the intervals."""
-
-    paths: int
-    comparisons: list[Comparison]
-    family_level: float
-
-
 class ThrDdm(ModelClaim):
     id = "THR-DDM"
     summary = "Simulated decisions take as long, and err as often, as the formulas say."
@@ -176,7 +149,6 @@ class ThrDdm(ModelClaim):
         "period or leak. Statistics exclude deviations larger than the intervals, not smaller ones."
     )
     expected = "supported"
-    record = Comparisons
     kept = True
     exercised_by = "simulated paths"
 
@@ -191,22 +163,22 @@ class ThrDdm(ModelClaim):
 def compare(chosen: tuple[PassageExperiment, ...], formulas: Formulas) -> Finding:
     """The verdict for these formulas: 'supported' if all intervals contain them, else 'refuted'."""
     rows = [row for experiment in chosen for row in _rows(simulate(experiment), formulas(experiment), 2 * len(chosen))]
-    worst = min(rows, key=lambda row: row.margin)
-    supported = worst.margin >= 0.0
+    worst = min(rows, key=lambda row: float(row["margin"]))
+    supported = worst["margin"] >= 0.0
     paths = sum(experiment.paths for experiment in chosen)
     return Finding(
         "supported" if supported else "refuted",
-        margin=worst.margin,
+        margin=worst["margin"],
         unit="interval half-widths",
         quantity="what a simulated mean leaves of its confidence interval about the formula",
-        where={"experiment": worst.experiment, "quantity": worst.quantity},
-        counterexample=None if supported else asdict(worst),
-        evidence=Comparisons(paths, rows, LEVEL),
+        where={key: worst[key] for key in ("experiment", "quantity")},
+        counterexample=None if supported else worst,
+        evidence={"paths": paths, "comparisons": rows, "family_level": LEVEL},
         exercised=paths,
     )
 
 
-def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int) -> list[Comparison]:
+def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int) -> list[dict[str, Any]]:
     """Compare the mean decision time and the error rate of an experiment with the formula's."""
     experiment, wrong = sample.experiment, sample.wrong
     count, period = experiment.paths, experiment.period
@@ -225,11 +197,12 @@ def _rows(sample: PassageSample, formula: tuple[float, float], comparisons: int)
     )
     constants = {**asdict(experiment), "noise_period_s": period, "barrier_m": experiment.barrier}
     return [
-        Comparison(
-            experiment=experiment.name, quantity=quantity, unit=unit, constants=constants, wrong_decisions=wrong,
-            periods_sum=sample.periods, periods_sum_of_squares=sample.squares, estimate=estimate, interval=interval,
-            formula=value, z_score=(estimate - value) / error,
-            margin=2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
-        )
+        {
+            "experiment": experiment.name, "quantity": quantity, "unit": unit, "constants": constants,
+            "wrong_decisions": wrong, "periods_sum": sample.periods, "periods_sum_of_squares": sample.squares,
+            "estimate": estimate, "interval": interval, "formula": value, "z_score": (estimate - value) / error,
+            # in half-widths of the interval
+            "margin": 2.0 * min(value - interval[0], interval[1] - value) / (interval[1] - interval[0]),
+        }
         for quantity, unit, estimate, error, interval, value in estimates
     ]  # fmt: skip

@@ -38,7 +38,7 @@ from airground_drake.base.statuses import Status
 from airground_drake.model.trigger.automaton import Mode, Trigger
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Chart, Evidence, Finding
+from airground_drake.verify.finding import Chart, Finding
 from airground_drake.verify.model.levels import levels_of, trigger_of
 
 LEVEL = 0.99
@@ -162,52 +162,6 @@ def counts(setting: Refinement) -> dict[str, Array]:
     return triggered
 
 
-@dataclass(frozen=True)
-class Counted(Evidence):
-    """Triggers in a path, a number for each dt: their mean, its standard error, the largest."""
-
-    mean: list[float]
-    standard_error: list[float]
-    largest: list[float]
-
-
-@dataclass(frozen=True)
-class Fit(Evidence):
-    """The curve exp(intercept + correction sqrt(dt)) dt^exponent, and its values at each dt."""
-
-    exponent: float
-    interval: list[float]
-    intercept: float
-    correction: float
-    at_dt: list[float]
-
-
-@dataclass(frozen=True)
-class Series(Evidence):
-    """The evidence: everything that the figure needs."""
-
-    # `dt_s` are the noise steps, and `expected_bare` is the theory of the bare mean at each. `counts` has a text for
-    # each path with its triggers at each dt. `bias` is that of the bare exponent. `most_triggers` is duration/dwell +
-    # 1; None without a dwell. `level` is that of the intervals.
-
-    dt_s: list[float]
-    bare: Counted
-    automaton: Counted
-    automaton_at_scenario_noise: Counted
-    expected_bare: list[float]
-    counts: dict[str, list[str]]
-    fit: dict[str, Fit]
-    bias: float
-    most_triggers: int | None
-    duration_s: float
-    noise_m_sqrt_s: float
-    own_noise_m_sqrt_s: float
-    leak_1_s: float
-    paths: int
-    seed: int
-    level: float
-
-
 class ZenoRefine(ModelClaim):
     id = "ZENO-REFINE"
     expected = "supported"
@@ -241,7 +195,6 @@ class ZenoRefine(ModelClaim):
         "run of the scenario has: its task error passes the threshold, it does not stay there (ZENO-TRACE counts them)."
     )
 
-    record = Series
     kept = True
     exercised_by = "simulated paths, each at every noise step"
 
@@ -259,39 +212,46 @@ class ZenoRefine(ModelClaim):
         return judge_experiment(experiment(inputs))
 
 
-def series(setting: Refinement, triggers: dict[str, Array]) -> Series:
+def series(setting: Refinement, triggers: dict[str, Array]) -> dict[str, Any]:
+    """The evidence: everything that the figure needs."""
     dt, dwell = np.array(setting.dt_s), setting.trigger.dwell
     expected = np.array([expected_bare(setting, step) for step in setting.dt_s])
     rng = np.random.default_rng([SEED, PATHS])
     weights = rng.multinomial(PATHS, np.full(PATHS, 1.0 / PATHS), RESAMPLES) / PATHS
-    fits = dict[str, Fit]()
+    fits = dict[str, dict[str, Any]]()
     for name in ("bare", "automaton"):
         intercept, exponent, correction = _fit(dt, triggers[name].mean(axis=0)).tolist()
         resampled = _fit(dt, weights @ triggers[name])[1]
         interval = np.quantile(resampled, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0]).tolist()
         at_dt = (np.exp(intercept + correction * np.sqrt(dt)) * dt**exponent).tolist()
-        fits[name] = Fit(exponent, interval, intercept, correction, at_dt)
-    return Series(
-        dt_s=dt.tolist(),
+        fits[name] = {
+            "exponent": exponent, "interval": interval, "intercept": intercept, "correction": correction,
+            "at_dt": at_dt,
+        }  # fmt: skip
+    return {
+        "dt_s": dt.tolist(),
         **{name: _counted(triggers[name]) for name in SERIES},
-        expected_bare=expected.tolist(),
-        counts={name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in triggers.items()},
-        fit=fits,
-        bias=float(_fit(dt, expected)[1]) + 0.5,
-        most_triggers=int(setting.duration_s / dwell + 1e-9) + 1 if dwell > 0.0 else None,
-        duration_s=setting.duration_s,
-        noise_m_sqrt_s=setting.noise_m_sqrt_s,
-        own_noise_m_sqrt_s=setting.own_noise_m_sqrt_s,
-        leak_1_s=setting.leak_1_s,
-        paths=PATHS,
-        seed=SEED,
-        level=LEVEL,
-    )
+        "expected_bare": expected.tolist(),
+        # a text for each path, with its triggers at each dt
+        "counts": {name: [" ".join(f"{n:.0f}" for n in row) for row in values] for name, values in triggers.items()},
+        "fit": fits,
+        "bias": float(_fit(dt, expected)[1]) + 0.5,  # of the bare exponent
+        "most_triggers": int(setting.duration_s / dwell + 1e-9) + 1 if dwell > 0.0 else None,
+        "duration_s": setting.duration_s,
+        "noise_m_sqrt_s": setting.noise_m_sqrt_s,
+        "own_noise_m_sqrt_s": setting.own_noise_m_sqrt_s,
+        "leak_1_s": setting.leak_1_s,
+        "paths": PATHS,
+        "seed": SEED,
+        "level": LEVEL,
+    }
 
 
-def _counted(values: Array) -> Counted:
+def _counted(values: Array) -> dict[str, list[float]]:
+    """Triggers in a path, a number for each dt."""
     error = values.std(axis=0, ddof=1) / math.sqrt(PATHS)
-    return Counted(values.mean(axis=0).tolist(), error.tolist(), values.max(axis=0).tolist())
+    mean, largest = values.mean(axis=0).tolist(), values.max(axis=0).tolist()
+    return {"mean": mean, "standard_error": error.tolist(), "largest": largest}
 
 
 def _fit(dt: Array, mean: Array) -> Array:
@@ -303,9 +263,9 @@ def _fit(dt: Array, mean: Array) -> Array:
 def judge_experiment(setting: Refinement) -> Finding:
     triggers = counts(setting)
     evidence = series(setting, triggers)
-    bare, ours = evidence.fit["bare"], evidence.fit["automaton"]
-    (low, high), (ours_low, ours_high) = bare.interval, ours.interval
-    bias = abs(evidence.bias)
+    bare, ours = evidence["fit"]["bare"], evidence["fit"]["automaton"]
+    (low, high), (ours_low, ours_high) = bare["interval"], ours["interval"]
+    bias = abs(evidence["bias"])
     slack = {
         "bare exponent: -1/2 is not below its interval": -0.5 - (low - bias),
         "bare exponent: -1/2 is not above its interval": high + bias + 0.5,
@@ -315,8 +275,8 @@ def judge_experiment(setting: Refinement) -> Finding:
         "automaton's exponent: close to 0": FLAT_WITHIN - max(-ours_low, ours_high),
     }
     condition = min(slack, key=lambda name: slack[name])
-    off = np.abs(np.array(evidence.bare.mean) - evidence.expected_bare)
-    most, largest = evidence.most_triggers, max(evidence.automaton.largest)
+    off = np.abs(np.array(evidence["bare"]["mean"]) - evidence["expected_bare"])
+    most, largest = evidence["most_triggers"], max(evidence["automaton"]["largest"])
     status: Status = "supported"
     broken: dict[str, Any] | None = None
     if most is not None and largest > most:
@@ -328,10 +288,10 @@ def judge_experiment(setting: Refinement) -> Finding:
         status = "inconclusive"
     elif slack[condition] < -ROUNDING:
         status = "refuted"
-        fit, counted = (bare, evidence.bare) if condition.startswith("bare") else (ours, evidence.automaton)
-        broken = {"what": f"not so: {condition}", "exponent": fit.exponent, "interval": fit.interval}
-        broken |= {"dt_s": evidence.dt_s, "mean": counted.mean}
-    elif (off > STANDARD_ERRORS * np.array(evidence.bare.standard_error)).any():
+        fit, counted = (bare, evidence["bare"]) if condition.startswith("bare") else (ours, evidence["automaton"])
+        broken = {"what": f"not so: {condition}", "exponent": fit["exponent"], "interval": fit["interval"]}
+        broken |= {"dt_s": evidence["dt_s"], "mean": counted["mean"]}
+    elif (off > STANDARD_ERRORS * np.array(evidence["bare"]["standard_error"])).any():
         status = "inconclusive"
     return Finding(
         status,
@@ -345,25 +305,25 @@ def judge_experiment(setting: Refinement) -> Finding:
     )
 
 
-def _chart(evidence: Series) -> Chart:
+def _chart(evidence: dict[str, Any]) -> Chart:
     """Triggers against the noise step, of the bare threshold and of the automaton."""
     counts = {
-        "bare threshold": evidence.bare.mean,
-        "bare, theory": evidence.expected_bare,
-        "automaton": evidence.automaton.mean,
+        "bare threshold": evidence["bare"]["mean"],
+        "bare, theory": evidence["expected_bare"],
+        "automaton": evidence["automaton"]["mean"],
     }
     exponents = (
-        f"{name}: exponent {fit.exponent:.3f}, {100 * evidence.level:g} % interval "
-        f"[{fit.interval[0]:.3f}, {fit.interval[1]:.3f}]"
-        for name, fit in (("Bare threshold", evidence.fit["bare"]), ("automaton", evidence.fit["automaton"]))
+        f"{name}: exponent {fit['exponent']:.3f}, {100 * LEVEL:g} % interval "
+        f"[{fit['interval'][0]:.3f}, {fit['interval'][1]:.3f}]"
+        for name, fit in (("Bare threshold", evidence["fit"]["bare"]), ("automaton", evidence["fit"]["automaton"]))
     )
     return Chart(
         "Triggers under refinement of the noise step",
         "noise step, s",
         "triggers per path",
-        {name: (evidence.dt_s, np.maximum(count, FEWEST)) for name, count in counts.items()},
+        {name: (evidence["dt_s"], np.maximum(count, FEWEST)) for name, count in counts.items()},
         log="xy",
-        caption=f"The task error stays at the threshold; means of {evidence.paths} paths of {evidence.duration_s:.3g} "
+        caption=f"The task error stays at the threshold; means of {PATHS} paths of {evidence['duration_s']:.3g} "
         "s. With finer noise the bare threshold triggers without bound, like one over the square root of the step; the "
         f"automaton does not. {'; '.join(exponents)}.",
     )

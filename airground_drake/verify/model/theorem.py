@@ -7,12 +7,12 @@ from fractions import Fraction
 from typing import Any, Self
 
 from airground_drake.verify.claim import ModelClaim
-from airground_drake.verify.finding import Evidence, Finding
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.proofs import THEOREMS, standing
 
 
 @dataclass(frozen=True)
-class Hypothesis(Evidence):
+class Hypothesis:
     """A hypothesis of a theorem with the numbers of a scenario."""
 
     hypothesis: str  # what the margin is of, in a few words

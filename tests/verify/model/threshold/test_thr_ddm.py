@@ -15,9 +15,9 @@ from airground_drake.verify.claims.thr_ddm import ThrDdm
 def test_formulas_are_supported_and_intervals_can_be_redone_by_hand(judged: Judged) -> None:
     """Binomial tails and the normal quantile with `math` only, from the recorded counts."""
     simulated = judged(ThrDdm())
-    assert (simulated.status, len(simulated.evidence.comparisons)) == ("supported", 12)
-    assert simulated.evidence.paths >= 20000
-    tail = (1.0 - simulated.evidence.family_level) / 12 / 2
+    assert (simulated.status, len(simulated.evidence["comparisons"])) == ("supported", 12)
+    assert simulated.evidence["paths"] >= 20000
+    tail = (1.0 - simulated.evidence["family_level"]) / 12 / 2
     quantile = NormalDist().inv_cdf(1.0 - tail)
 
     def below(k: int, n: int, p: float) -> float:
@@ -27,18 +27,18 @@ def test_formulas_are_supported_and_intervals_can_be_redone_by_hand(judged: Judg
             for i in range(k + 1)
         )
 
-    for row in simulated.evidence.comparisons:
-        n, wrong, period = row.constants["paths"], row.wrong_decisions, row.constants["noise_period_s"]
-        low, high = row.interval
-        if row.quantity == "error rate":
+    for row in simulated.evidence["comparisons"]:
+        n, wrong, period = row["constants"]["paths"], row["wrong_decisions"], row["constants"]["noise_period_s"]
+        low, high = row["interval"]
+        if row["quantity"] == "error rate":
             assert below(wrong, n, high - thr_ddm.ERROR_ALLOWANCE) == pytest.approx(tail, rel=1e-6)
             assert 1.0 - below(wrong - 1, n, low + thr_ddm.ERROR_ALLOWANCE) == pytest.approx(tail, rel=1e-6)
         else:
-            mean = row.periods_sum / n
-            spread = math.sqrt((row.periods_sum_of_squares / n - mean**2) / (n - 1))
+            mean = row["periods_sum"] / n
+            spread = math.sqrt((row["periods_sum_of_squares"] / n - mean**2) / (n - 1))
             half = quantile * spread + thr_ddm.TIME_ALLOWANCE
             assert ((high - low) / 2, (high + low) / 2) == pytest.approx((half * period, (mean - 0.25) * period))
-        assert low < row.formula < high
+        assert low < row["formula"] < high
 
 
 def test_wrong_formulas_are_refuted() -> None:

@@ -22,13 +22,13 @@ def test_the_shipped_trigger_is_supported(judged: Judged, case_a: Scenario) -> N
     assert finding.status == "supported", finding.counterexample
     evidence = finding.evidence
     assert evidence == zeno_refine.series(experiment(REFINE), zeno_refine.counts(experiment(REFINE)))
-    assert evidence.dt_s[0] / evidence.dt_s[-1] >= 256
-    low, high = evidence.fit["bare"].interval
+    assert evidence["dt_s"][0] / evidence["dt_s"][-1] >= 256
+    low, high = evidence["fit"]["bare"]["interval"]
     assert low < -0.49 < high < -0.4
-    assert max(evidence.automaton.largest) <= evidence.most_triggers == 61
-    assert evidence.bare.mean[-1] > 10.0 * evidence.bare.mean[0]
-    last = [float(row.split()[-1]) for row in evidence.counts["bare"]]
-    assert sum(last) / zeno_refine.PATHS == pytest.approx(evidence.bare.mean[-1])
+    assert max(evidence["automaton"]["largest"]) <= evidence["most_triggers"] == 61
+    assert evidence["bare"]["mean"][-1] > 10.0 * evidence["bare"]["mean"][0]
+    last = [float(row.split()[-1]) for row in evidence["counts"]["bare"]]
+    assert sum(last) / zeno_refine.PATHS == pytest.approx(evidence["bare"]["mean"][-1])
 
 
 class NoDwell(Trigger):
