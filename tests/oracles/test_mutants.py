@@ -90,7 +90,7 @@ PREDICTIONS: dict[str, Callable[[ClosedLoop], ClosedLoop]] = {
 
 
 @pytest.mark.parametrize(
-    ("run", "name"), [*(("c", name) for name in PREDICTIONS), *(("d", n) for n in list(PREDICTIONS)[2:])]
+    ("run", "name"), [*(("c", name) for name in PREDICTIONS), ("d", "no neighbours"), ("d", "late")]
 )
 def test_wrong_predictions_are_noticed(run: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Until shortly after the first acceptance. What case B's outcomes under (d) rest on is not the gains."""

@@ -47,7 +47,10 @@ class It(TraceClaim):
     def applies(self, trace): os._exit(0)
     def check(self, trace): ...
 """
-IN_C = ["case_a", "gatekeeper.route=IT", "runs={c: {method: c}}", "duration_s=16", "reproduction=[]", "choices=[]"]
+IN_C = [
+    "case_a", "gatekeeper.route=IT", "runs={c: {method: c}}", "duration_s=4", "decision.threshold.zeta_m=0.5",
+    "decision.release_m=0.2", "reproduction=[]", "choices=[]",
+]  # fmt: skip
 JUDGED = ["minimal", "duration_s=0.5", "claims={MINE: 'IT'}"]
 
 

@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.uav.database import Asked, BehaviourDatabase, Negotiation, make_policy
 from airground_drake.uav.guest import process
 from airground_drake.uav.guest.codec import KINDS as CLASSES
@@ -223,13 +224,10 @@ def test_all_that_is_seen_and_proposed_arrives_to_the_bit() -> None:
     assert back.positions.tobytes() == motion.positions.tobytes()
 
 
-def test_a_run_with_a_policy_in_another_process_is_the_same_to_the_bit() -> None:
-    traces = []
-    for name in ("detour", "airground_drake.uav.detour:Detour"):
-        scenario = load("case_a", ["duration_s=18"])
-        scenario.intervention.policies[0].name = name
-        traces.append(simulate(scenario, "d"))
-    one, other = traces
+def test_a_run_with_a_policy_in_another_process_is_the_same_to_the_bit(run: Callable[[str, str], Trace]) -> None:
+    scenario = load("case_a")
+    scenario.intervention.policies[0].name = "airground_drake.uav.detour:Detour"
+    one, other = run("case_a", "d"), simulate(scenario, "d")
     assert (one.states.to_numpy() == other.states.to_numpy()).all()
     assert len(one.proposals) > 0
     for column in ("issued_s", "times_s", "positions_m", "mapped"):

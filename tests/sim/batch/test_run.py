@@ -32,7 +32,7 @@ def differences(scenario: Scenario, run: str, seeds: range = range(1)) -> list[o
     return [found for pair in pairs if (found := first_difference(*pair)) is not None]
 
 
-@pytest.mark.parametrize("run", ["a", "b", "c", "d"])
+@pytest.mark.parametrize("run", ["c", "d"])
 def test_a_run_is_drakes_bit_by_bit(run: str) -> None:
     """All tables, events and parameters; proposals, answers and a release are among them."""
     short = load("case_a", ["duration_s=17.33", "reproduction=[]"])  # no multiple of any period
