@@ -34,6 +34,7 @@ from airground_drake.verify import judge
 from airground_drake.verify.engines.outlines import unpacked
 from airground_drake.verify.proofs.export import recorded
 from airground_drake.verify.proofs.table import too_near
+from airground_drake.verify.runs.encounters import encounters
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25
 """Radii, m, whose sums are exact."""
@@ -194,6 +195,10 @@ def test_where_it_appears_too_near_is_nobodys_doing() -> None:
     seen = found["SAFE-TRACE"].counterexample or {}
     assert (seen["t_s"], seen["min_distance_m"]) == pytest.approx((4.2, 0.8))
     assert seen["why"] == "rock appeared at 4.2 s too near to ugv1: nobody's doing"
+    measured = simulate(
+        sudden(4.2, "sensing={position_error_m: 0.05}", "duration_s=7", "control.avoidance_gain_1_s=9"), "d"
+    )
+    assert [encounter.doing for encounter in encounters(measured)] == ["nobody"]
     broken = found["SAFE-HYP"].counterexample or {}
     assert (broken["hypothesis"], broken["t_s"]) == ("safe start", pytest.approx(4.2))
     assert not faults_of(trace)
