@@ -195,13 +195,15 @@ def test_where_it_appears_too_near_is_nobodys_doing() -> None:
     seen = found["SAFE-TRACE"].counterexample or {}
     assert (seen["t_s"], seen["min_distance_m"]) == pytest.approx((4.2, 0.8))
     assert seen["why"] == "rock appeared at 4.2 s too near to ugv1: nobody's doing"
-    measured = simulate(
-        sudden(4.2, "sensing={position_error_m: 0.05}", "duration_s=7", "control.avoidance_gain_1_s=9"), "d"
-    )
-    assert [encounter.doing for encounter in encounters(measured)] == ["nobody"]
     broken = found["SAFE-HYP"].counterexample or {}
     assert (broken["hypothesis"], broken["t_s"]) == ("safe start", pytest.approx(4.2))
     assert not faults_of(trace)
+
+
+def test_what_errors_of_positions_take_beyond_the_distance_is_not_the_robots_doing() -> None:
+    errors = "sensing={position_error_m: 0.05, errors: adversarial, correlation_s: 0.2}"
+    trace = simulate(sudden(3.02, errors, "control.avoidance_gain_1_s=9", "duration_s=6"), "a")
+    assert [encounter.doing for encounter in encounters(trace)] == ["nobody"]
 
 
 def test_it_collides_with_nobody_before_it_appears() -> None:
