@@ -34,6 +34,7 @@ from airground_drake.verify import judge
 from airground_drake.verify.engines.outlines import unpacked
 from airground_drake.verify.proofs.export import recorded
 from airground_drake.verify.proofs.table import too_near
+from airground_drake.verify.runs.encounters import encounters
 
 ROCK, OWN, FLIER = 0.5, 0.25, 0.25
 """Radii, m, whose sums are exact."""
@@ -197,6 +198,12 @@ def test_where_it_appears_too_near_is_nobodys_doing() -> None:
     broken = found["SAFE-HYP"].counterexample or {}
     assert (broken["hypothesis"], broken["t_s"]) == ("safe start", pytest.approx(4.2))
     assert not faults_of(trace)
+
+
+def test_what_errors_of_positions_take_beyond_the_distance_is_not_the_robots_doing() -> None:
+    errors = "sensing={position_error_m: 0.05, errors: adversarial, correlation_s: 0.2}"
+    trace = simulate(sudden(3.02, errors, "control.avoidance_gain_1_s=9", "duration_s=6"), "a")
+    assert [encounter.doing for encounter in encounters(trace)] == ["nobody"]
 
 
 def test_it_collides_with_nobody_before_it_appears() -> None:

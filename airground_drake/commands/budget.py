@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
 # Values of a key that is given without any, by its unit; the last entry is for shares.
 USUAL = {"_s": (0.0, 0.1, 0.3, 1.0), "_m": (0.0, 0.02, 0.05, 0.1), "": (0.0, 0.1, 0.5)}
-PROMISED, LAW = "promised_m", "law_m"  # what is told of a kind of pair
+PROMISED, LAW, OLD = "promised_m", "law_m", "old_positions_m"  # what is told of a kind of pair
 MEANING = "metres, by kind of pair: the distance promised between surfaces -> the distance that the law keeps"
+MEANING_OF_OLD = "; + the way of the other one: nearer than both, two UGVs may only part"
 MOST_NAMED = 6  # bodies that are named in a line at most
 
 
@@ -114,11 +115,12 @@ def _costs(scenario: Scenario, key: str, value: object) -> dict[str, float]:
         pairs = budget(validated(scenario, {key: value}))
     except ScenarioError:
         return {}
-    dearest = {pair.kind: pair for pair in sorted(pairs, key=lambda pair: pair.gap_m - pair.promised_m)}
+    dearest = {pair.kind: pair for pair in sorted(pairs, key=lambda p: (p.gap_m - p.promised_m, p.unsure_m))}
     return {
         f"{kind} {name}": metres
         for kind, pair in dearest.items()
-        for name, metres in ((PROMISED, pair.promised_m), (LAW, pair.gap_m))
+        for name, metres in ((PROMISED, pair.promised_m), (LAW, pair.gap_m), (OLD, pair.unsure_m))
+        if name != OLD or metres
     }
 
 
@@ -129,11 +131,15 @@ def _as_text(rows: DataFrame, key: str) -> str:
     for law in rows.columns[rows.columns.str.endswith(LAW)]:
         kind = law.removesuffix(LAW)
         promised = rows[f"{kind}{PROMISED}"].map("{:.3f}".format)
-        shown[f"{kind}m"] = (promised + rows[law].map(" -> {:.3f}".format)).where(rows[law].notna(), "-")
+        told = promised + rows[law].map(" -> {:.3f}".format)
+        if (old := f"{kind}{OLD}") in rows:
+            told += rows[old].map(" + {:.3f}".format).where(rows[old].notna(), "")
+        shown[f"{kind}m"] = told.where(rows[law].notna(), "-")
     shown["arrived"] = (rows["arrived"].map(str) + " of " + rows["ugvs"].map(str)).where(judged, "-")
     shown["last at, s"] = rows["arrival_s"].round(2)
     shown[DISTANCES] = rows[DISTANCES].fillna("-") if DISTANCES in rows else "-"
-    return "\n".join([shown.to_string(index=False, na_rep="-"), "", MEANING, *dict.fromkeys(rows["what"][~judged])])
+    meaning = MEANING + MEANING_OF_OLD * any(rows.columns.str.endswith(OLD))
+    return "\n".join([shown.to_string(index=False, na_rep="-"), "", meaning, *dict.fromkeys(rows["what"][~judged])])
 
 
 def _about(group: Sequence[PairBudget]) -> str:

@@ -1,9 +1,11 @@
 """What a scenario says that is allowed and seldom meant, in words for the person who wrote it."""
 
 from collections.abc import Iterator
+from math import dist
 
 import numpy as np
 
+from airground_drake.scenario.budget import budget
 from airground_drake.scenario.hints import fast
 from airground_drake.scenario.schema import SafeDistance, Scenario
 
@@ -26,3 +28,12 @@ def notes(scenario: Scenario) -> Iterator[str]:
     if kept and (0.0 < radius < SMALL_M or side < NARROW_M):
         small = f"UGVs with a radius of {radius:g} m" if 0.0 < radius < SMALL_M else f"ways within {side:.2g} m"
         yield f"{', '.join(kept)}: values of the paper, which are large for {small}; set your own"
+    for pair in budget(scenario) if scenario.asynchronous else ():
+        if not pair.unsure_m:
+            continue
+        first, second = (scenario.ugvs[name] for name in (pair.first, pair.second))
+        told = f"{pair.first} and {pair.second} reckon with {pair.unsure_m:.3g} m of each other's way"
+        if pair.unsure_m >= pair.law_m:
+            yield f"{told}, {pair.law_m:.3g} m or more: where they meet they can stand for ever; shorten the delay"
+        if (apart_m := dist(first.start_m, second.start_m)) < (near_m := pair.law_m + pair.unsure_m):
+            yield f"{told}, and start {apart_m:.3g} m apart: they may only part within {near_m:.3g} m"

@@ -9,6 +9,8 @@ import pytest
 from airground_drake.base.errors import ScenarioError
 from airground_drake.commands.budget import main
 
+RUNS = "runs={d: {method: d}}"
+
 
 @pytest.mark.parametrize("scenario", ["turtlebots", "lagging", "case_a_unicycle", "case_a"])
 def test_the_terms_add_up(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -56,6 +58,15 @@ def test_one_imperfection_is_shown_by_its_values(capsys: pytest.CaptureFixture[s
         main(["lagging", "d", "--vary", "control.perid_s=1"])
     assert main(["lagging", "d"]) == 2
     assert "wanted: --vary, or no run" in capsys.readouterr().err
+
+
+def test_the_room_for_old_positions_is_shown_by_the_delay(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    old = ["--set", "channel={ugvs: {}}", "--set", "control.law=asynchronous", "--set", "duration_s=0.1", "--set", RUNS]
+    asked = ["swap", "d", *old, "--vary", "channel.ugvs.delay_s=0,0.3", "--jobs", "1", "-o", str(tmp_path / "a.svg")]
+    assert main([*asked, "--json"]) == 0
+    assert [row["ugv old_positions_m"] for row in json.loads(capsys.readouterr().out)] == pytest.approx([0.1, 0.7])
+    assert main(asked) == 0
+    assert "1.000 -> 1.000 + 0.700" in capsys.readouterr().out
 
 
 def test_third_party_code_is_not_imported(

@@ -17,6 +17,7 @@ from airground_drake.report.export import recording
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
+from airground_drake.study.logs import judging
 
 Run = Callable[[str, str], Trace]
 BETWEEN_M = 5e-4
@@ -53,6 +54,14 @@ def test_a_run_that_obeyed_the_law_is_promised_its_distances(run: Run, judged: C
         assert all(pair["promised_m"] == pytest.approx(pair["safe_m"], abs=1e-9) for pair in found["pairs"])
         assert all(all(pair["hypotheses"].values()) for pair in found["pairs"])
         assert (found["status"], found["covered"]["all"]) == ("kept", True)
+
+
+def test_what_a_log_lacks_to_judge_old_positions_is_said(run: Run, judged: Callable[..., dict[str, Any]]) -> None:
+    table = sampled(run("swap", "d"))
+    given = "channel={ugvs: {}}", "control.law=asynchronous", "runs={a: {method: a}}"
+    changes = [word for change in given for word in ("--set", change)]
+    told = [judged(table, "swap", *more)["not_judged"] for more in ((), changes)]
+    assert [entry for entry in told[1] if entry not in told[0]] == [judging.NOT_JUDGED_OF_OLD]
 
 
 def test_a_run_that_hits_an_obstacle_is_exit_code_1(run: Run, judged: Callable[..., dict[str, Any]]) -> None:

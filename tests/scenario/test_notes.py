@@ -36,5 +36,20 @@ def test_small_robots_and_worlds_with_the_papers_distances_and_great_speeds_are_
     assert [*notes(load("minimal", changes))] == said
 
 
+@pytest.mark.parametrize(("delay_s", "gap_m", "said"), [(0.3, 8, 0), (0.6, 8, 1), (0.3, 1.5, 1), (0.6, 1.5, 2)])
+def test_ugvs_that_can_block_each_other_with_old_positions_are_noted(delay_s: float, gap_m: float, said: int) -> None:
+    """At 2 m/s and 0.05 s that is 0.7 m of the other's way, or 1.3 m; 1 m is to be kept."""
+    changes = {"control.law": "asynchronous", "channel": {"ugvs": {"delay_s": delay_s}}}
+    changes |= {
+        "runs": {"d": {"method": "d"}},
+        "ugvs.ugv1.start_m": [-gap_m / 2, 0.0, 0.0],
+        "ugvs.ugv2.start_m": [gap_m / 2, 0.0, 0.0],
+    }
+    told = [*notes(load("swap", changes))]
+    assert len(told) == said
+    assert ("they can stand for ever" in "".join(told)) == (delay_s == 0.6)
+    assert ("they may only part within" in "".join(told)) == (gap_m == 1.5)
+
+
 def test_shipped_scenarios_have_no_notes_but_the_one_that_is_small() -> None:
     assert {name for name in shipped() for _ in notes(load(name))} == {"dwell"}

@@ -23,6 +23,7 @@ from airground_drake.check.scenario import (
     Pair,
     barriers_of,
     expected_m_s,
+    is_asynchronous,
     pairs_of,
     places_of,
     robots_of,
@@ -45,6 +46,10 @@ NOT_JUDGED = (
     "places of obstacles at rest, walls and maps: the scenario's are taken",
     "triggers, proposals, decisions, commands and arrivals",
 )
+
+
+# With `control.law: asynchronous`.
+NOT_JUDGED_OF_OLD = "what UGVs had heard of each other: the law judged between two UGVs is the shared one, not theirs"
 
 
 class JudgedPair(NamedTuple):
@@ -115,6 +120,7 @@ class Judged(NamedTuple):
     stray_m: float  # how far a robot can be from that straight line at its speed limit
     speeds_m_s: dict[str, tuple[float, float]]  # largest speed of each robot in the log, and its limit
     away_m: dict[str, float]  # how far each robot starts from where the scenario has it
+    not_judged: tuple[str, ...]
 
     @property
     def status(self) -> str:
@@ -159,6 +165,7 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
         stray_m=stray,
         speeds_m_s=speeds,
         away_m=away,
+        not_judged=(*NOT_JUDGED, *((NOT_JUDGED_OF_OLD,) if is_asynchronous(scenario) else ())),
     )
 
 
@@ -451,5 +458,5 @@ def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
     return {
         "status": judged.status, "covered": covered, "pairs": pairs, "bodies": bodies,
         "speeds_m_s": {name: list(both) for name, both in judged.speeds_m_s.items()}, "starts_away_m": judged.away_m,
-        "said": tracks.said, "not_used": tracks.ignored, "not_judged": list(NOT_JUDGED),
+        "said": tracks.said, "not_used": tracks.ignored, "not_judged": list(judged.not_judged),
     }  # fmt: skip

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from airground_drake.check.rules import SMALL
 from airground_drake.report.sentences import some
-from airground_drake.study.logs.judging import BROKEN, KEPT, NOT_JUDGED, OPEN, Judged, JudgedPair
+from airground_drake.study.logs.judging import BROKEN, KEPT, OPEN, Judged, JudgedPair
 from airground_drake.study.logs.tracks import Span, Tracks
 
 LEAST_TOLD_M = 0.0005  # smaller approaches do not count, m
@@ -112,7 +112,7 @@ def source(name: str, tracks: Tracks) -> str:
 
 
 def not_judged(judged: Judged) -> Iterator[str]:
-    first, *others = NOT_JUDGED
+    first, *others = judged.not_judged
     longest = f"the longest interval is {judged.longest_s:.3g} s, in which a robot"
     yield f"{first}; {longest} at its speed limit can leave the line by {judged.stray_m:.2g} m"
     yield from others

@@ -27,7 +27,7 @@ from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_u
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import inequalities_of
 from airground_drake.verify.runs.demands import differences
-from airground_drake.verify.runs.old_positions import missed_m, unsure_m
+from airground_drake.verify.runs.old_positions import heard_at, missed_m, unsure_m
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Pair,
@@ -327,8 +327,9 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
 
 
 def _unsure_m(trace: Trace, pair: Pair) -> float:
-    """The largest way that one of two UGVs had to reckon with of the other one, m."""
-    return max(float(unsure_m(trace, *both).max()) for both in permutations((pair.first, pair.second)))
+    """The largest way that one of two UGVs had to reckon with of the other one, m; inf if it had no position of it."""
+    ways = [(permuted, heard_at(trace, *permuted)) for permuted in permutations((pair.first, pair.second))]
+    return max(inf if (heard < 0).any() else float(unsure_m(trace, *both).max()) for both, heard in ways)
 
 
 def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
@@ -415,7 +416,7 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     in_range = 0
     for robot in trace.robots:
         given = inequalities_of(trace, robot, as_seen=trace.scenario.sensing is not None)
-        in_range += len(given.bound)
+        in_range += int((given.distance <= trace.scenario.control.sensing_range_m).sum())
         for column in given.column[given.slack(trace.chosen(robot)) <= BINDING_M_S].tolist():
             count[f"{kind_of(robot)} beside {beside[column]}"] += 1
     return in_range, count

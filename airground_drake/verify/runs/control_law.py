@@ -27,6 +27,7 @@ class Inequalities(NamedTuple):
     # What is avoided, (C,): the number of a part in `pairs.parts_of`, or that of a robot after all parts.
     column: Indices
     normal: Array  # (C, 3)
+    distance: Array  # from what is avoided, or where it was when last heard of, (C,), m
     bound: Array  # (C,), m/s
     retreat: Array  # n.v at which the robot should retreat, (C,), m/s, a task below all inequalities; 0: it need not
 
@@ -105,9 +106,10 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     if unsure.any():
         unsure = np.append(np.zeros(len(near.core)), unsure)
         k, normal, bound = _towards_old(normal, bound, distance, safe, unsure, control.period_s)
-        when, column, retreat = when[k], column[k], retreat[k]
+        when, column, distance, retreat = when[k], column[k], distance[k], retreat[k]
     moves = np.array([trace.scenario.barriers[name].moves is not None for name in parts.names], dtype=np.bool_)
     rank = np.concatenate([np.where(moves[parts.owner], 2, 0), np.ones(len(trace.robots), dtype=np.intp)])
     order = np.lexsort([column, rank[column], when])
     normal = normal * (PLANE if planar else 1.0)
-    return Inequalities(when[order], column[order], normal[order], bound[order], retreat[order])
+    away = normal[order], distance[order]
+    return Inequalities(when[order], column[order], *away, bound[order], retreat[order])

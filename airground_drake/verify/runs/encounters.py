@@ -81,7 +81,8 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     place = trace.body(robot)
     origin = origin_of(trace, other)
     planar = is_planar(trace, robot)
-    keeps = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m
+    # Errors of measured positions may take all that the law keeps beyond d.
+    keeps = pair.safe_m if pair.error_m else pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m
     off_m = off_m_of(trace, robot)
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)

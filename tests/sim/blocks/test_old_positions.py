@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,25 @@ def test_a_position_of_no_sample_so_far_is_found() -> None:
         ours = safety.safe_hyp(checked(wrong))
         assert ours.because is not None
         assert ours.because.rule == "position heard before"
+
+
+def test_a_position_of_no_sample_is_found_of_far_ugvs_too() -> None:
+    far = simulate(old_team(0, 0.1, 0.5, {"duration_s": 1.0}), "a")
+    for first, second in permutations(far.ugvs, 2):
+        wrong = forged(far, f"{first}.heard_{second}_s", 1e9, 10)
+        assert found(wrong, "SAFE-HYP") == {"SAFE-HYP": "refuted"}
+
+
+def test_inequalities_in_range_are_those_within_the_sensing_range() -> None:
+    """As many as with the shared law, while UGVs are farther from each other."""
+    counts = set()
+    for changes in ({}, OLD):
+        far = simulate(
+            load("swap", {"duration_s": 0.5, "channel": {"ugvs": {}}, "runs": {"a": {"method": "a"}}} | changes), "a"
+        )
+        (verdict,) = judge(far, ["SAFE-HYP"])
+        counts.add(verdict.evidence["inequalities_in_range"])
+    assert len(counts) == 1
 
 
 def towards(x: float, y: float, unsure: float, task: Array) -> Array:
