@@ -10,6 +10,7 @@ gets SIGTERM.
 
 import ctypes
 import fcntl
+import gc
 import io
 import os
 import select
@@ -44,6 +45,7 @@ _exit_code: int | None = None
 
 def begin() -> None:
     """Begin a command, before the imports that take seconds: see this module."""
+    gc.set_threshold(100_000)  # what is imported stays: to look for garbage among it took an eighth of the imports
     has_home = os.path.isabs(os.path.expanduser("~"))
     for name, value in (CURRENT_FOLDER if has_home else CURRENT_FOLDER | NO_HOME).items():
         os.environ.setdefault(name, value)

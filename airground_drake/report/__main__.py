@@ -69,7 +69,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     scenario = load(AUDITED if audited else options.scenario, overrides)
     if audited:
         scenario.name, scenario.title, scenario.description = AUDIT, AUDIT_TITLE, AUDIT_DESCRIPTION
-    from airground_drake.report import attention, make, model, screen  # slow to import: only for a valid scenario
+    from airground_drake.report import make  # slow to import: only for a valid scenario
     from airground_drake.verify.cache import cache_folder
 
     kept = None if options.no_cache else cache_folder()
@@ -88,7 +88,10 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     ):
         findings = partial(_findings, progress, audited=audited)
         wanted = make.Wanted(options.format, command, kept, findings, audited, limits, options.seeds)
-        report = model.of(make.write_report(scenario, output, wanted, progress))
+        made = make.write_report(scenario, output, wanted, progress)
+    from airground_drake.report import attention, model, screen  # imported while the runs were simulated
+
+    report = model.of(made)
     overall = report.overall
     for line in attention.failures({name: run.faults for name, run in report.runs.items()}):
         print(line, file=sys.stderr)

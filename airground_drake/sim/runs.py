@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -120,8 +121,9 @@ def _simulated(
     most = processors() if jobs is None else max(1, jobs)
     if not _compiled():
         progress.stage("compiling, once, about half a minute")
-    if forks():
+    if forks():  # what each run would load for itself
         warm_up()
+        import_module("pyarrow.parquet")
     progress.stage(f"simulating {what}", sum(scenario.duration_s for scenario, _ in work), "s")
     waiting, running = deque(enumerate(work)), dict[int, _Process]()
     with files.temporary_folder() as made, warnings.catch_warnings():

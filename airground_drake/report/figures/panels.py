@@ -31,6 +31,10 @@ class Panel:
     table: Table
     drawing: Drawing = field(compare=False, repr=False)  # source of the SVG, for files of other formats
 
+    def __getstate__(self) -> dict[str, object]:
+        """Without the drawing: pages need none, and to send one to another process takes as long as to draw it."""
+        return {**vars(self), "drawing": None}
+
 
 @dataclass(frozen=True)
 class Figure:

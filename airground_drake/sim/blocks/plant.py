@@ -9,7 +9,6 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -282,6 +281,8 @@ def step_of(system: System) -> float:
 
 def _steps(system: System) -> Iterator[float]:
     """Times between steps of the systems in a system, s."""
+    from pydrake.multibody.plant import MultibodyPlant  # slow to import: only for users' plants
+
     if isinstance(system, MultibodyPlant):  # whose steps are no discrete updates if its outputs are sampled
         yield from [system.time_step()] if system.time_step() else []
     elif isinstance(system, Diagram):

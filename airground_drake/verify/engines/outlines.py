@@ -139,6 +139,10 @@ def _edges(corners: Array) -> _Edges:
 
 def away_from(cores: Cores, place: Array, *, planar: bool) -> Away:
     """Distances of places from cores, and the directions in which they grow."""
+    if cores.are_points:
+        vector = place - cores.points
+        distance = np.sqrt(np.square(vector).sum(axis=-1))
+        return Away(distance, vector / np.where(distance > 0.0, distance, 1.0)[..., None])
     edges, to = _edges(cores.corners), place[..., None, :2] - cores.corners
     squared = np.where(edges.real, np.square(edges.vector).sum(axis=-1), 1.0)
     along = (to * edges.vector).sum(axis=-1) / squared
