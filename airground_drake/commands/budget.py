@@ -138,7 +138,7 @@ def _as_text(rows: DataFrame, key: str) -> str:
     shown["arrived"] = (rows["arrived"].map(str) + " of " + rows["ugvs"].map(str)).where(judged, "-")
     shown["last at, s"] = rows["arrival_s"].round(2)
     shown[DISTANCES] = rows[DISTANCES].fillna("-") if DISTANCES in rows else "-"
-    meaning = MEANING + MEANING_OF_OLD * any(rows.columns.str.endswith(OLD))
+    meaning = f"{MEANING}{MEANING_OF_OLD}" if any(rows.columns.str.endswith(OLD)) else MEANING
     return "\n".join([shown.to_string(index=False, na_rep="-"), "", meaning, *dict.fromkeys(rows["what"][~judged])])
 
 

@@ -28,12 +28,23 @@ def notes(scenario: Scenario) -> Iterator[str]:
     if kept and (0.0 < radius < SMALL_M or side < NARROW_M):
         small = f"UGVs with a radius of {radius:g} m" if 0.0 < radius < SMALL_M else f"ways within {side:.2g} m"
         yield f"{', '.join(kept)}: values of the paper, which are large for {small}; set your own"
-    for pair in budget(scenario) if scenario.asynchronous else ():
-        if not pair.unsure_m:
-            continue
-        first, second = (scenario.ugvs[name] for name in (pair.first, pair.second))
-        told = f"{pair.first} and {pair.second} reckon with {pair.unsure_m:.3g} m of each other's way"
-        if pair.unsure_m >= pair.law_m:
-            yield f"{told}, {pair.law_m:.3g} m or more: where they meet they can stand for ever; shorten the delay"
-        if (apart_m := dist(first.start_m, second.start_m)) < (near_m := pair.law_m + pair.unsure_m):
-            yield f"{told}, and start {apart_m:.3g} m apart: they may only part within {near_m:.3g} m"
+    if scenario.asynchronous:
+        yield from _of_old_positions(scenario)
+
+
+def _of_old_positions(scenario: Scenario) -> Iterator[str]:
+    """The pairs of UGVs that may block each other where they meet, and those that start so: the worst of each."""
+    pairs = [pair for pair in budget(scenario) if pair.unsure_m]
+    starts = {name: ugv.start_m for name, ugv in scenario.ugvs.items()}
+    room_m = [pair.law_m - pair.unsure_m for pair in pairs]
+    spare_m = [dist(starts[pair.first], starts[pair.second]) - pair.law_m - pair.unsure_m for pair in pairs]
+    for margins_m, told in (
+        (room_m, "the distance of the law, {law:.3g} m, or more: where they meet they can stand for ever"),
+        (spare_m, "and start within the sum of this and the distance of the law, {law:.3g} m: they may only part"),
+    ):
+        count = sum(margin_m <= 0.0 for margin_m in margins_m)
+        if count:
+            pair = pairs[int(np.argmin(margins_m))]
+            others = f" (and {count - 1} more pairs)" if count > 1 else ""
+            reckon = f"reckon with {pair.unsure_m:.3g} m of each other's way"
+            yield f"{pair.first} and {pair.second}{others} {reckon}, {told.format(law=pair.law_m)}"

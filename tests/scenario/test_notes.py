@@ -48,7 +48,7 @@ def test_ugvs_that_can_block_each_other_with_old_positions_are_noted(delay_s: fl
     told = [*notes(load("swap", changes))]
     assert len(told) == said
     assert ("they can stand for ever" in "".join(told)) == (delay_s == 0.6)
-    assert ("they may only part within" in "".join(told)) == (gap_m == 1.5)
+    assert ("they may only part" in "".join(told)) == (gap_m == 1.5)
 
 
 def test_shipped_scenarios_have_no_notes_but_the_one_that_is_small() -> None:
