@@ -1,6 +1,6 @@
 """A policy that is trained in the step-wise environment, and then proposes like any other.
 
-    python learned_policy.py train      # by the cross-entropy method, on two processors; writes learned_policy.json
+    python learned_policy.py train      # by CMA-ES, on two processors; writes learned_policy.json
     python learned_policy.py compare    # with the policies that plan, on maps that it was not trained on
 
 For each request it looks at 512 ways to the target with two corners each, and proposes the one with the best score,
@@ -16,6 +16,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 
+import cma
 import numpy as np
 
 from airground_drake import Motion, Observation, Policy
@@ -119,20 +120,20 @@ def returns(many: np.ndarray, number: int) -> list[float]:
     return found
 
 
-def train(rounds: int = 6, size: int = 12, maps: int = 18, seed: int = 1, jobs: int = 2) -> tuple[np.ndarray, list]:
+def train(rounds: int = 8, size: int = 12, maps: int = 18, seed: int = 1, jobs: int = 2) -> tuple[np.ndarray, list]:
     """The mean of the last round, (6,), and for each round the mean return, s, of START and of its mean on its maps."""
-    rng, mean, spread, history = np.random.default_rng(seed), START, np.ones(len(START)), []
+    search = cma.CMAEvolutionStrategy(START, 1.0, {"popsize": size, "seed": seed, "verbose": -9})
+    history = []
     with ProcessPoolExecutor(jobs) as pool:
         for k in range(rounds):
-            drawn = mean + spread * rng.standard_normal((size, len(mean)))
+            drawn = search.ask()
             numbers = TRAINING + maps * k + np.arange(maps)
-            every = pool.map(partial(returns, np.vstack([START, mean, drawn])), numbers.tolist())
+            every = pool.map(partial(returns, np.vstack([START, search.mean, drawn])), numbers.tolist())
             values = np.mean([row for row in every if row], axis=0)
             history.append((values[0], values[1]))
             print(f"round {k + 1}: before training {values[0]:.1f} s, now {values[1]:.1f} s", flush=True)
-            best = np.argsort(-values[2:])[: size // 3]
-            mean, spread = drawn[best].mean(axis=0), drawn[best].std(axis=0) + 0.1
-    return mean, history
+            search.tell(drawn, -values[2:])
+    return search.mean, history
 
 
 def outcome(number: int) -> dict[str, tuple]:
