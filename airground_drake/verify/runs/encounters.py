@@ -202,11 +202,27 @@ def _whose_doing(trace: Trace, least: Gap) -> str:
         return "robot"
     taking = [robot for robot in robots if own[robot].of_body.min(initial=np.inf) < -DISTANCE_TOLERANCE_M]
     if taking:
-        return "under way" if any(bounds_of(trace)[robot].late for robot in taking) else "robot"
+        late = any(bounds_of(trace)[robot].late for robot in taking)
+        return "robot" if not late or any(_steered_nearer(trace, pair, robot) for robot in taking) else "under way"
     if least.row <= _first_apart(pair, gap_over_time(trace, pair)):
         return "nobody"
     moved = np.ptp(origin_of(trace, pair.second)[pair.rows], axis=0).any()
     return "other" if moved and pair.second not in trace.robots else "robot"
+
+
+def _steered_nearer(trace: Trace, pair: Pair, robot: str) -> bool:
+    """Whether commands led the steered point of a robot nearer than the law keeps: the body only follows, later."""
+    rows = trace.sample_rows[(trace.sample_rows >= pair.row) & (trace.sample_rows <= pair.last)]
+    other = pair.second if robot == pair.first else pair.first
+    origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
+    beside = cores_of(trace).get(other, CENTRE).take((slice(None), None))
+    planar = is_planar(trace, robot)
+    before, after = (
+        away_from(beside, trace.position(robot)[at] - origin[rows[:-1]], planar=planar).distance.min(axis=0)
+        for at in (rows[:-1], rows[1:])
+    )
+    keeps_m = pair.safe_m if pair.error_m else pair.keeps_m(trace.scenario.control.period_s)
+    return bool((after < np.minimum(before, keeps_m) - DISTANCE_TOLERANCE_M).any())
 
 
 def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:

@@ -175,3 +175,14 @@ def test_no_promise_is_above_the_truth() -> None:
     assert [words for result in results for words in result.broken] == []
     for promise in ("guarantee", "proved", "kept period", "cleared", "SAFE-OWN", "budget"):
         assert tested[promise] >= 10, tested
+
+
+def test_whoever_commands_a_late_body_into_a_rock_did_it() -> None:
+    """Under (b) the steered point itself is led into the rock."""
+    changes = {
+        "ugvs.ugv1.plant": {"kind": "delay", "delay_s": 0.1},
+        "intervention.policies": [{"name": "towards", "parameters": {"speed_m_s": 1.5, "x_m": 10.0, "y_m": 0.0}}],
+        "runs": {"b": {"method": "b"}},
+    }
+    (met,) = judge(simulate(load("minimal", changes), "b"), ("SAFE-TRACE",))[0].evidence["encounters"]
+    assert met["doing"] == "robot"
