@@ -55,9 +55,9 @@ def test_compilation_does_not_count() -> None:
     def total(numbers: np.ndarray) -> float:
         return float(np.sort(numbers).cumsum()[-1])
 
-    with time_limit(0.01):
+    with time_limit(0.2):  # what is not compilation takes 0.01 s of an idle machine
         assert njit(cache=False)(total)(np.ones(3)) == 3.0
-    with pytest.raises(OutOfTime), time_limit(0.01):
+    with pytest.raises(OutOfTime), time_limit(0.2):
         _waits_for_ever(njit(cache=False)(total)(np.ones(4)))
 
 
