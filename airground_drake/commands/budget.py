@@ -115,7 +115,9 @@ def _costs(scenario: Scenario, key: str, value: object) -> dict[str, float]:
         pairs = budget(validated(scenario, {key: value}))
     except ScenarioError:
         return {}
-    dearest = {pair.kind: pair for pair in sorted(pairs, key=lambda p: (p.gap_m - p.promised_m, p.unsure_m))}
+    dearest = {
+        pair.kind: pair for pair in sorted(pairs, key=lambda pair: (pair.gap_m - pair.promised_m, pair.unsure_m))
+    }
     return {
         f"{kind} {name}": metres
         for kind, pair in dearest.items()

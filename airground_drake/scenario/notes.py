@@ -39,12 +39,12 @@ def _of_old_positions(scenario: Scenario) -> Iterator[str]:
     room_m = [pair.law_m - pair.unsure_m for pair in pairs]
     spare_m = [dist(starts[pair.first], starts[pair.second]) - pair.law_m - pair.unsure_m for pair in pairs]
     for margins_m, told in (
-        (room_m, "the distance of the law, {law:.3g} m, or more: where they meet they can stand for ever"),
-        (spare_m, "and start within the sum of this and the distance of the law, {law:.3g} m: they may only part"),
+        (room_m, "where they meet they can stand for ever"),
+        (spare_m, "they start within the sum of both, so they may only part"),
     ):
-        count = sum(margin_m <= 0.0 for margin_m in margins_m)
-        if count:
+        if min(margins_m, default=1.0) <= 0.0:
             pair = pairs[int(np.argmin(margins_m))]
-            others = f" (and {count - 1} more pairs)" if count > 1 else ""
-            reckon = f"reckon with {pair.unsure_m:.3g} m of each other's way"
-            yield f"{pair.first} and {pair.second}{others} {reckon}, {told.format(law=pair.law_m)}"
+            count = sum(margin_m <= 0.0 for margin_m in margins_m)
+            others = f" (the first of {count} pairs)" if count > 1 else ""
+            room = f"{pair.unsure_m:.3g} m of each other's way beside a distance of {pair.law_m:.3g} m in the law"
+            yield f"{pair.first} and {pair.second}{others} reckon with {room}: {told}"

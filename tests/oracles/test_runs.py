@@ -1,4 +1,4 @@
-"""No oracle finds a fault in a run of the code as it is: unusual ones here."""
+"""No oracle finds a fault in unusual runs of the code as it is."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -55,7 +55,7 @@ def test_compilation_does_not_count() -> None:
     def total(numbers: np.ndarray) -> float:
         return float(np.sort(numbers).cumsum()[-1])
 
-    with time_limit(0.2):  # what is not compilation takes 0.01 s of an idle machine
+    with time_limit(0.2):  # beside compilation, an idle machine needs 0.01 s
         assert njit(cache=False)(total)(np.ones(3)) == 3.0
     with pytest.raises(OutOfTime), time_limit(0.2):
         _waits_for_ever(njit(cache=False)(total)(np.ones(4)))

@@ -77,7 +77,7 @@ class Batch:
             "several UAVs": bool(more),
             "a UAV that is lost": uav.lost_at_s > 0.0,
             "a gatekeeper with a limit by the clock": given.gatekeeper.budget == "wall_clock" and method.gated,
-            f"the controller {given.ugv_controller and given.ugv_controller.kind} of the UGVs": given.ugv_controller,
+            "a controller of the user's": given.ugv_controller is not None,
         }
         reasons = [why for why, applies in left.items() if applies]
         if reasons:

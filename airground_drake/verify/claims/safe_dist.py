@@ -127,6 +127,7 @@ class SafeDist(TheoremClaim):
         passive, once, kept = (sum(column) for column in zip(*seen, (0, 0, 0), strict=True))
         if not passive or not is_proof(finding.evidence):
             return finding
+        # too near to an obstacle that may move: a retreat at w or more with `w_h_once`, at w + V or more with `kept`
         periods = {"passive_periods": passive, "passive_periods_w_h_once": once, "passive_periods_kept": kept}
         return replace(finding, evidence=finding.evidence | periods)
 

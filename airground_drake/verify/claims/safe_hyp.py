@@ -328,8 +328,10 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
 
 def _unsure_m(trace: Trace, pair: Pair) -> float:
     """The largest way that one of two UGVs had to reckon with of the other one, m; inf if it had no position of it."""
-    ways = [(permuted, heard_at(trace, *permuted)) for permuted in permutations((pair.first, pair.second))]
-    return max(inf if (heard < 0).any() else float(unsure_m(trace, *both).max()) for both, heard in ways)
+    both_ways = [*permutations((pair.first, pair.second))]
+    if any((heard_at(trace, *names) < 0).any() for names in both_ways):
+        return inf
+    return max(float(unsure_m(trace, *names).max()) for names in both_ways)
 
 
 def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:

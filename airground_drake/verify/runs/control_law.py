@@ -111,5 +111,4 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     rank = np.concatenate([np.where(moves[parts.owner], 2, 0), np.ones(len(trace.robots), dtype=np.intp)])
     order = np.lexsort([column, rank[column], when])
     normal = normal * (PLANE if planar else 1.0)
-    away = normal[order], distance[order]
-    return Inequalities(when[order], column[order], *away, bound[order], retreat[order])
+    return Inequalities(when[order], column[order], normal[order], distance[order], bound[order], retreat[order])

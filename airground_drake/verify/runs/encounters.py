@@ -12,7 +12,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.sim.trace import Trace, per_trace
-from airground_drake.verify.engines.outlines import Cores, apart_by_blocks, away_from, least_distances
+from airground_drake.verify.engines.outlines import Cores, apart_by_blocks, away_from, least_distances, over_time
 from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
 from airground_drake.verify.runs.pairs import (
     BENT_M,
@@ -215,11 +215,9 @@ def _steered_nearer(trace: Trace, pair: Pair, robot: str) -> bool:
     rows = trace.sample_rows[(trace.sample_rows >= pair.row) & (trace.sample_rows <= pair.last)]
     other = pair.second if robot == pair.first else pair.first
     origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
-    beside = cores_of(trace).get(other, CENTRE).take((slice(None), None))
-    planar = is_planar(trace, robot)
+    cores, planar = cores_of(trace).get(other, CENTRE), is_planar(trace, robot)
     before, after = (
-        away_from(beside, trace.position(robot)[at] - origin[rows[:-1]], planar=planar).distance.min(axis=0)
-        for at in (rows[:-1], rows[1:])
+        over_time(cores, trace.position(robot)[at] - origin[rows[:-1]], planar=planar) for at in (rows[:-1], rows[1:])
     )
     keeps_m = pair.safe_m if pair.error_m else pair.keeps_m(trace.scenario.control.period_s)
     return bool((after < np.minimum(before, keeps_m) - DISTANCE_TOLERANCE_M).any())

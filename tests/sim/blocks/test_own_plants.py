@@ -228,7 +228,7 @@ def test_beside_somebody_who_walks_both_programs_say_the_same(declared: float, w
 def test_the_theorem_is_about_the_declared_numbers() -> None:
     (verdict,) = judge_model(of(Robot, drift_m_s=0.3, cover_m=0.1).scenario, claims=["SAFE-BUDGET"])
     assert verdict.status == "proved"
-    assert "Mixed.drifting" in verdict.evidence["theorems"]  # type: ignore[union-attr]
+    assert "Mixed.drifting" in verdict.evidence["theorems"]
 
 
 def checked(trace: Trace, samples: Any = None, states: Any = None) -> Run:
