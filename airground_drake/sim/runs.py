@@ -23,13 +23,13 @@ from typing import Any
 
 from airground_drake.base import files, interruption
 from airground_drake.base.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described, one_line
-from airground_drake.base.parallel import forks, processors
+from airground_drake.base.parallel import forks, processes, processors
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.model.law import kernels
 from airground_drake.scenario.load import validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim import trace
-from airground_drake.sim.simulation import Engine, simulate, warm_up
+from airground_drake.sim.simulation import Engine, simulate, warm_up, warm_up_beside
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.guest.process import end_all
 
@@ -119,10 +119,14 @@ def _simulated(
 ) -> Iterator[Trace]:
     """Simulate runs of validated scenarios, each in a process of its own; arguments as of `simulate_all`."""
     most = processors() if jobs is None else max(1, jobs)
-    if not _compiled():
+    compiled, kept_in = _compiled(), kernels.avoid_one.stats.cache_path
+    if not compiled:
         progress.stage("compiling, once, about half a minute")
     if forks():  # what each run would load for itself
-        warm_up()
+        with processes(1) as another:
+            if kept_in and not compiled:
+                another.submit(warm_up_beside)
+            warm_up()
         import_module("pyarrow.parquet")
     progress.stage(f"simulating {what}", sum(scenario.duration_s for scenario, _ in work), "s")
     waiting, running = deque(enumerate(work)), dict[int, _Process]()

@@ -149,8 +149,9 @@ def _rolled_out(
     steps = len(loop.preset) - 1
     second = max(1, round(1.0 / loop.law.layer.period))
     positions = np.empty((steps + 1, 3))
-    positions[0] = loop.start
     position, work = loop.start.copy(), workspace(loop)
+    for a in range(3):
+        positions[0, a] = position[a]
     cost = 0.0
     for k in range(steps):
         advance(loop, ACCEPTED if k < accepted else REFUSED, k, position, work)

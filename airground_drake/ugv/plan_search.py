@@ -37,7 +37,8 @@ def beam_search(terms: Terms, block: Blocks, width: int = BEAM) -> Array:
     stages = len(block)
     modes, parents = np.zeros((stages, width), np.int64), np.zeros((stages, width), np.int64)
     ends, costs, many = np.empty((width, 3)), np.zeros(width), 1
-    ends[0] = terms.initial
+    for a in range(3):
+        ends[0, a] = terms.initial[a]
     reached, total = np.empty((2 * width, 3)), np.empty(width)
     for k in range(stages):
         goes_on = k > 0 and block[k] == block[k - 1]
@@ -62,7 +63,9 @@ def beam_search(terms: Terms, block: Blocks, width: int = BEAM) -> Array:
             count = min(count + 1, width)
         many = count
         for i in range(many):
-            costs[i], ends[i] = total[i], reached[parents[k, i]]
+            costs[i] = total[i]
+            for a in range(3):
+                ends[i, a] = reached[parents[k, i], a]
             parents[k, i] //= ways
     plan, i = np.empty(stages), 0
     for k in range(stages - 1, -1, -1):

@@ -130,7 +130,7 @@ def workspace(loop: ClosedLoop) -> Workspace:
     return Workspace(plane, which, normal, bound, retreat, np.empty(3), np.empty(3), np.full(1, loop.heading))
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def advance(loop: ClosedLoop, mode: int, k: int, position: Array, work: Workspace) -> Array:
     """Move the UGV through control period k, and return its mean velocity in it, (3,), m/s."""
     # Only here do predictions assume a plant. The steered point of every plant of `model.plants.plant` gets from sample
@@ -176,5 +176,6 @@ def follow(loop: ClosedLoop, answers: npt.NDArray[np.int64]) -> tuple[Array, Arr
             velocity = advance(loop, answers[stage], k, position, work)
             for a in range(3):
                 mean[stage, a] += velocity[a] / loop.substeps
-        positions[stage] = position
+        for a in range(3):
+            positions[stage, a] = position[a]
     return positions, mean

@@ -238,7 +238,9 @@ def commands(lower: Array, positions: Array, near: Neighbours, layer: Layer) -> 
             layer, which, normal, bound, retreat,
         )  # fmt: skip
         task = yielding(velocity[i], normal[:count], retreat[:count], max_speed[i])
-        velocity[i] = avoid_one(task, normal[:count], bound[:count], layer.composition, max_speed[i])
+        safe = avoid_one(task, normal[:count], bound[:count], layer.composition, max_speed[i])
+        for a in range(3):
+            velocity[i, a] = safe[a]
     return velocity
 
 

@@ -190,5 +190,7 @@ def commands(
         )  # fmt: skip
         count = keep_ahead(headings[i], steering[i], normal, bound, retreat, count)
         task, own = AcceptedMotion(wanted[i], wanted_rate[i], chosen[i]), Tracking(target[i], rate[i])
-        velocity[i] = command(law, ugv, own, task, executing[i], normal[:count], bound[:count], retreat[:count])
+        safe = command(law, ugv, own, task, executing[i], normal[:count], bound[:count], retreat[:count])
+        for a in range(3):
+            velocity[i, a] = safe[a]
     return velocity

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry.motion import Motion
+from airground_drake.model.geometry.moving import at
 
 
 class Corners(NamedTuple):
@@ -32,6 +33,7 @@ class Corners(NamedTuple):
     first: npt.NDArray[np.int64]  # rows of each UGV's own vertices: from `first[j]` to before `first[j + 1]`, (n + 1,)
     own_times: Array  # their times, (C,), s
     places: Array  # and places, (C, 3), m
+    slopes: Array  # velocities from each of them to the next, (C, 3), m/s; the last of each UGV has none
 
     @classmethod
     def of(cls, presets: Sequence[Motion]) -> Corners:
@@ -43,6 +45,7 @@ class Corners(NamedTuple):
             np.cumsum([0, *(len(preset.times) for preset in presets)], dtype=np.int64),
             np.concatenate([np.zeros(0), *(preset.times for preset in presets)]),
             np.concatenate([np.zeros((0, 3)), *(preset.positions for preset in presets)]),
+            np.concatenate([np.zeros((0, 3)), *(np.append(p.slopes, [np.zeros(3)], axis=0) for p in presets)]),
         )
 
 
@@ -148,8 +151,8 @@ def stretches(begun: Array, now: Array, corners: Corners) -> tuple[Array, Array,
     n, stops = len(before), last - first + 2
     times, bent = np.empty(stops), np.zeros(n, dtype=np.bool_)
     times[0], times[stops - 1] = begun[0], now[0]
-    times[1 : stops - 1] = corners.times[first:last]
     for corner in range(first, last):
+        times[1 + corner - first] = corners.times[corner]
         bent[corners.ugvs[corner]] = True
     parts = np.empty((stops, n, 4))
     for k in range(stops):
@@ -161,11 +164,15 @@ def stretches(begun: Array, now: Array, corners: Corners) -> tuple[Array, Array,
         if not bent[j]:
             continue
         rows = slice(corners.first[j], corners.first[j + 1])
-        for a in range(3):
-            place = np.interp(times, corners.own_times[rows], corners.places[rows, a])
-            for k in range(stops):
-                share = (times[k] - times[0]) / (times[stops - 1] - times[0])
-                parts[k, j, a] += place[k] - place[0] - share * (place[stops - 1] - place[0])
+        places = np.empty((stops, 3))
+        for k in range(stops):
+            place, _ = at(corners.own_times[rows], corners.places[rows], corners.slopes[rows], times[k])
+            for a in range(3):
+                places[k, a] = place[a]
+        for k in range(stops):
+            share = (times[k] - times[0]) / (times[stops - 1] - times[0])
+            for a in range(3):
+                parts[k, j, a] += places[k, a] - places[0, a] - share * (places[stops - 1, a] - places[0, a])
     return times, parts, bent
 
 
@@ -179,7 +186,9 @@ def ranges(begun: Array, now: Array, corners: Corners) -> Array:
         n = len(bent)
         x, least, most = np.empty((len(times), n)), np.full(n, np.inf), np.full(n, -np.inf)
         for k in range(len(times)):
-            x[k] = variables(parts[k])
+            at_stop = variables(parts[k])
+            for j in range(n):
+                x[k, j] = at_stop[j]
         for k in range(len(times) - 1):
             piece = extremes(parts[k], parts[k + 1], x[k : k + 2])
             for j in range(n):
