@@ -9,7 +9,7 @@ from pathlib import Path
 from mutation.mutant import Mutant
 
 TESTS: dict[str, tuple[str, ...]] = {
-    "WIRING": ("tests/hypotheses/test_wiring.py",),
+    "WIRING": ("tests/oracles/test_runs.py", "tests/sim/test_simulation.py"),
     "CROWD": ("tests/check/test_honest_runs.py::test_a_crowd",),
     "BODY": ("tests/sim/test_events.py", "tests/test_bodies.py"),
     "TRIGGER": (

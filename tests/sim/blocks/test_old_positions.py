@@ -193,29 +193,6 @@ def test_plans_keep_what_the_law_keeps_and_the_budget_tells_it() -> None:
     assert SafeBudget().judge(SafeBudget().inputs(scenario)).status == "proved"
 
 
-LAG = {"ugvs.ugv1.plant": {"kind": "lag", "time_constant_s": 0.1}}
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"channel": None}, r"control\.law: .*asynchronous.*channel\.ugvs: \{\} would do"),
-        (LAG, r"ugvs\.ugv1\.plant: .*first_order with control\.law: asynchronous"),
-        ({"sensing": {"position_error_m": 0.01}}, "sensing: .*no theorem is about old positions with errors"),
-        ({"sensing": {"uav_error_m": 0.01}}, "sensing: "),
-        ({"runs": {"c": {"method": "c"}}}, r"runs\.c\.method: .*a or d with control\.law: asynchronous"),
-        ({"runs": {"a": {"method": "a", "composition": "recursion_listed"}}}, "augmented with control.law"),
-        ({"ugv_controller": {"kind": "mine.py:Mine"}}, "a controller of your own knows all positions"),
-        ({"ugvs.ugv2.target_m": [-4.0, 0.0, 0.0], "ugvs.ugv1.target_m": [-4.0, 0.9, 0.0]}, r"ugv2\.target_m: .* old"),
-        ({"control.law": "late"}, "shared, asynchronous"),
-    ],
-)
-def test_what_no_theorem_covers_is_refused(changes: dict[str, Any], said: str) -> None:
-    data = resolved(old_team(0, 0.3, 0.1)) | {key: changes[key] for key in changes if "." not in key}
-    with pytest.raises(ScenarioError, match=said):
-        from_data(data, "test", {key: changes[key] for key in changes if "." in key})
-
-
 def test_a_method_that_is_not_among_the_runs_is_refused_too() -> None:
     with pytest.raises(ScenarioError, match="avoidance is not on top in this run"):
         build_diagram(old_team(0, 0.3, 0.1), "c")

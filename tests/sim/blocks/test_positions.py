@@ -10,7 +10,7 @@ from oracles import faults_of
 from sim.blocks.both_programs import broken_rules, checked, found
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, ScenarioError
+from airground_drake.base.errors import PluginError
 from airground_drake.check import safety
 from airground_drake.model.plants.budget import Bounds, law_distance, part_of_gain
 from airground_drake.scenario.load import from_data, load, resolved
@@ -181,32 +181,6 @@ def test_a_position_that_is_heard_at_no_time_so_far_is_not_heard() -> None:
     trace = run(0, 0.5)
     samples = trace.samples.assign(**{"ugv1.heard_ugv2_s": 1e9})
     assert broken_rules(replace(trace, samples=samples)) == 2 * ["standing without a message"]
-
-
-DRIFTS = {"ugvs.ugv1.plant": {"kind": "mine.py:Mine", "drift_m_s": 0.1}}
-
-
-@pytest.mark.parametrize(
-    ("links", "changes", "said"),
-    [
-        (
-            {"delay_s": 0.06},
-            {},
-            r"ugvs\.delay_s: 0\.06 .*at most control\.period_s = 0\.05 s.*= 0\.06 would do",
-        ),
-        ({"delay_s": -0.1}, {}, "a number in s from 0"),
-        ({"loss": 1.0}, {}, "loss"),
-        ({"loss": 0.2}, {"runs.a.set": {"channel.ugvs.loss": 0.9}}, "the same in all runs"),
-        ({"loss": 0.2}, {"ugv_controller": {"kind": "mine.py:Mine"}}, "a controller of your own knows all positions"),
-        ({"loss": 0.2}, DRIFTS, r"ugv1\.plant\.drift_m_s: 0\.1 is not allowed; 0 with channel\.ugvs\.loss"),
-        ({"delay_s": 0.02}, DRIFTS, "0 with channel.ugvs.delay_s"),
-        ({}, {**DRIFTS, "sensing": {"position_error_m": 0.01}}, "0 with sensing.position_error_m"),
-        ({"loss": 0.2}, {"sensing": {"position_error_m": 0.05}, "control.avoidance_gain_1_s": 5.0}, "at least 5.64"),
-    ],
-)
-def test_links_that_nothing_bears_are_refused(links: dict[str, float], changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(ScenarioError, match=said):
-        from_data(resolved(team(0, None)) | {"channel": {"ugvs": links}}, "test", changes)
 
 
 def test_one_of_a_pair_that_may_stand_costs_half_the_gain() -> None:
