@@ -137,13 +137,6 @@ def test_a_policy_that_crashes_is_told_with_its_first_traceback_and_may_be_heard
         assert all(line.isprintable() for line in said)
 
 
-@pytest.mark.parametrize("name", ["..:x", "a b:x", "a:x:y", ":x", "a:x()"])
-def test_names_of_no_module_are_one_line(name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    change = f"intervention.policies.0.name={json.dumps(name)}"
-    assert main(["case_a", "-o", str(tmp_path / "out"), "--allow-plugins", "--set", change]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a command has no child to work in")
 @pytest.mark.parametrize(
