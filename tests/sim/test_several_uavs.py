@@ -50,13 +50,6 @@ def crossed() -> Trace:
     return simulate(load("two_uavs", {**CROSSED, "duration_s": 6.0}), "a")
 
 
-def test_all_arrive_and_nothing_is_found_wrong(trace: Trace) -> None:
-    assert {event["robot"] for event in trace.events if event["kind"] == "arrival"} == {*trace.robots}
-    for claim in ("SAFE-TRACE", "SAFE-HYP", "GATE-PLAN", "LIVE-HYP", "LIVE-GOAL"):
-        assert decided(claim, trace).status == "holds"
-    assert not faults_of(trace)
-
-
 def test_a_uav_alone_that_is_lost_helps_nobody_any_more(run: Run) -> None:
     trace = run("crossing", "d", set=["uav.lost_at_s=5", "duration_s=15"])
     assert trace.proposals.empty
