@@ -9,7 +9,11 @@ from pathlib import Path
 from mutation.mutant import Mutant
 
 TESTS: dict[str, tuple[str, ...]] = {
-    "WIRING": ("tests/hypotheses/test_wiring.py",),
+    "WIRING": (
+        "tests/oracles/test_runs.py::test_a_run_among_walls_has_no_fault",
+        "tests/oracles/test_runs.py::test_the_uavs_avoidance_and_contradicting_inequalities",
+        "tests/sim/test_simulation.py::test_claims_do_not_depend_on_the_periods",
+    ),
     "CROWD": ("tests/check/test_honest_runs.py::test_a_crowd",),
     "BODY": ("tests/sim/test_events.py", "tests/test_bodies.py"),
     "TRIGGER": (

@@ -39,6 +39,7 @@ def test_a_lost_class_says_nothing() -> None:
         ("math:pi", {}, PluginError, "is not a subclass of airground_drake.uav.policy.Policy"),
         ("detour", {}, PluginError, "missing a required argument: 'speed_m_s'; allowed: speed_m_s (needed), clearance"),
         ("detour", {"speed_m_s": -1.0}, PluginError, "ValueError: detour needs speed_m_s > 0"),
+        ("detour", {"speed_m_s": 1.0, "follow_s": 601.0}, PluginError, "follow_s from 0 to 600"),
         ("coordinate", {"max_sped": 3.0}, PluginError, "an unexpected keyword argument 'max_sped'; allowed: speed_m_s"),
     ],
 )

@@ -3,11 +3,9 @@
 import os
 import resource
 import signal
-import socket
 import stat
 import struct
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -66,12 +64,6 @@ def swallow(seen: Observation) -> None:
 
 def fork(parent: Callable[[], object], child: Callable[[], object]) -> None:
     parent() if os.fork() else child()
-
-
-def in_a_thread(does: Callable[[], object]) -> None:
-    thread = threading.Thread(target=does)
-    thread.start()
-    thread.join()
 
 
 def out_of_its_session() -> None:
@@ -141,11 +133,6 @@ def drip(seen: Observation) -> None:
         say(b" ")
 
 
-def shut(seen: Observation) -> None:
-    for handle in channels():
-        socket.socket(fileno=os.dup(handle)).shutdown(socket.SHUT_RDWR)
-
-
 def answer(message: object) -> Callable[[Observation], None]:
     return lambda seen: setattr(worker, "answer", lambda policy, data: message)
 
@@ -187,7 +174,6 @@ KINDS: dict[str, Kind] = {
     # ends
     "sys_exit_0": tame("SystemExit: 0", lambda seen: sys.exit(0)),
     "os_exit_0": wild(ENDED + r"exit code 0\)", lambda seen: os._exit(0)),
-    "os_exit_in_a_thread": wild(ENDED + r"exit code 0\)", lambda seen: in_a_thread(partial(os._exit, 0))),
     "kills_its_group": wild(ENDED + "signal 9", lambda seen: forever(os.killpg(0, signal.SIGKILL))),
     # hangs
     "becomes_another_program": late(lambda seen: os.execv("/bin/sleep", ["sleep", "1000"])),
@@ -228,7 +214,6 @@ KINDS: dict[str, Kind] = {
     "prints_a_gigabyte": wild(None, print_a_gigabyte),
     "opens_the_terminal": wild("OSError|FileNotFoundError", lambda seen: Path("/dev/tty").write_text("as declared")),
     "closes_every_descriptor": wild(ENDED, lambda seen: os.closerange(0, 256)),
-    "shuts_the_channel": wild(ENDED, shut),
     "sends_garbage": wild(NO_MESSAGE, send(b"\x80\x04garbage.")),
     "announces_four_gigabytes": wild(
         NO_MESSAGE + ": bad message length", lambda seen: say(struct.pack("!iQ", -1, 2**32))
@@ -248,7 +233,6 @@ KINDS: dict[str, Kind] = {
     "sends_a_fault_that_is_no_text": wild("its process does not say what went", answer({"fault": {"no": "text"}})),
     "sends_a_fault_of_a_million_characters": wild("y{300}$", answer({"fault": "y" * 10**6})),
     # changes other code, outlives its process, attacks another one
-    "patches_the_avoidance_layer": wild(None, patch("model.law.avoidance", "Avoidance", "apply")),
     "patches_the_claims": wild(None, patch("verify.claim", "TraceClaim", "judge")),
     "leaves_a_child_behind": wild(None, lambda seen: fork(lambda: None, forever)),
     **{name: wild("PermissionError", lambda seen, does=does: does(os.getppid())) for name, does in TO_PARENT.items()},

@@ -166,6 +166,12 @@ report                                  # a scenario is needed
 report minimal --format html,,json      # formats are html, json, junit
 report minimal --limit-steps x          # a number above 0, at most 1e+15
 report minimal --limit-memory nan       # a number above 0, at most 1e+15
+report no_such_scenario                 # case_a
+report minimal --set no.such=1          # no
+report case_a --set intervention.policies.0.name=teleport # teleport
+run case_a d --set intervention.policies.0.parameters.warp=9 # warp
+report case_a --set decision.noise_period_s=1e-9 # allowed: 1e+07 steps, 8 GiB
+report case_a --limit-steps 100 --limit-memory 0.1 # allowed: 1e+02 steps, 0.1 GiB
 report minimal --seed x                 # invalid int value: 'x'
 report minimal -o spec.yaml             # spec.yaml cannot be written
 report minimal --set gatekeeper=&a      #

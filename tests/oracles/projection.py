@@ -21,6 +21,8 @@ CONTRADICTION_M_S = 1e-9
 ABOVE_LEAST, ABOVE_LEAST_M_S = 1e-9, 1e-11
 """A violation may exceed the least one by the first, relatively, and by the second, m/s: no speed is spent on
 rounding."""
+PARTS = 32
+"""Into how many parts the range of the least violation is cut at a time."""
 
 
 def closest(
@@ -36,12 +38,19 @@ def closest(
         found, met = _in_interval(wanted[:, 0], unit[:, :, 0], level, contradiction)
         return found[:, None], possible & met
     found = wanted.copy()
-    for k in range(bound.shape[1]):
-        rows = np.flatnonzero((np.einsum("bd,bd->b", unit[:, k], found) < level[:, k] - ROUNDING_M_S) & possible)
-        if rows.size:
-            found[rows], met = _on_boundary(wanted[rows], unit[rows, : k + 1], level[rows, : k + 1], contradiction)
-            possible[rows] &= met
+    missed = _missed(unit, level, found) & possible[:, None]
+    while missed.any():
+        k = int(missed.any(axis=0).argmax())
+        rows = np.flatnonzero(missed[:, k])
+        found[rows], met = _on_boundary(wanted[rows], unit[rows, : k + 1], level[rows, : k + 1], contradiction)
+        possible[rows] &= met
+        missed[rows] = _missed(unit[rows], level[rows], found[rows]) & possible[rows, None]
+        missed[:, : k + 1] = False
     return found, possible
+
+
+def _missed(unit: Array, level: Array, velocity: Array) -> Flags:
+    return np.asarray((unit @ velocity[..., None])[..., 0] < level - ROUNDING_M_S)
 
 
 def _on_boundary(wanted: Array, unit: Array, level: Array, contradiction: float) -> tuple[Array, Flags]:
@@ -82,16 +91,18 @@ def shortened(velocity: Array, normal: Array, bound: Array) -> Array:
 
 
 def least_violation(normal: Array, bound: Array) -> Array:
-    """The slowest of the velocities that miss inequalities by as little as possible, (B, d), m/s; by bisection.
+    """The slowest of the velocities that miss inequalities by as little as possible, (B, d), m/s; by section.
 
     Violations that exceed the least one by `ABOVE_LEAST` and `ABOVE_LEAST_M_S` count as equal to it.
     """
-    still = np.zeros((normal.shape[0], normal.shape[2]))
+    rows, still = np.arange(len(bound)), np.zeros((normal.shape[0], normal.shape[2]))
     low = np.zeros(len(bound))
     high = np.maximum(0.0, bound.max(axis=1, initial=0.0)) + ROUNDING_M_S  # standing still misses none by more
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        met = closest(still, normal, bound - middle[:, None], contradiction=0.0)[1]
-        high, low = np.where(met, middle, high), np.where(met, low, middle)
+    many = [np.repeat(each, PARTS - 1, axis=0) for each in (still, normal, bound)]
+    for _ in range(10):  # to 2^-50 of it
+        ends = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, PARTS + 1)
+        met = closest(*many[:2], many[2] - ends[:, 1:-1].reshape(-1, 1), contradiction=0.0)[1].reshape(len(rows), -1)
+        first = np.where(met.any(axis=1), met.argmax(axis=1), PARTS - 1)
+        low, high = ends[rows, first], ends[rows, first + 1]
     enough = (1.0 + ABOVE_LEAST) * high[:, None] + ABOVE_LEAST_M_S
     return closest(still, normal, bound - enough, contradiction=0.0)[0]

@@ -39,7 +39,7 @@ from airground_drake.sim.tables import SEEN_COLUMNS, typed
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import RADIUS, unpacked
 from airground_drake.verify.runs.proposals import proposals_of
-from oracles import ORACLES, commands, faults_of, predictions
+from oracles import ORACLES, commands, predictions
 from oracles.communication import SENSED_M
 from oracles.outcome_rolls import foreseen
 from oracles.protocol import answers_to
@@ -183,8 +183,11 @@ def acting(trace: Trace) -> int:
     return int(np.flatnonzero(trace.sampled("ugv1.executing") >= 0.0)[3])
 
 
-def test_a_joint_plan_that_only_some_accept_is_no_fault(base: Base) -> None:
-    assert not faults_of(base(JOINT))
+@pytest.mark.parametrize(
+    "oracle", [pytest.param(each, marks=[pytest.mark.slow] * (each == "predictions")) for each in ORACLES]
+)
+def test_a_joint_plan_that_only_some_accept_is_no_fault(base: Base, oracle: str) -> None:
+    assert not ORACLES[oracle](base(JOINT))
 
 
 @pytest.mark.parametrize(("oracle", "row"), [(name, row) for name, rows in RECORDS.items() for row in rows],

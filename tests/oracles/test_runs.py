@@ -35,7 +35,7 @@ AHEAD = (
 @pytest.mark.parametrize("plant", AHEAD)
 def test_a_run_of_a_robot_that_only_drives_ahead_has_no_fault(plant: str, composition: str) -> None:
     """Its heading at the start is across its way, so that the inequalities of its plant bind; it does not stand."""
-    given = [f"ugvs.ugv1.plant={plant[:-1]}, heading_rad: 1.2}}", "duration_s=12"]
+    given = [f"ugvs.ugv1.plant={plant[:-1]}, heading_rad: 1.2}}", "duration_s=8"]
     trace = simulate(load("minimal", [*given, f"runs.d.composition={composition}"]), "d")
     assert not faults_of(trace)
     assert np.linalg.norm(trace.chosen("ugv1")[:20], axis=1).all()

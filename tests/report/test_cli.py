@@ -78,32 +78,6 @@ def test_an_unexpected_verdict_is_exit_code_1(tmp_path: Path, capsys: pytest.Cap
     assert not {"report.html", "junit.xml"} & {path.name for path in tmp_path.iterdir()}
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["no_such_scenario"], "case_a"),
-        (["case_a", "--set", "no.such=1"], "no"),
-        (["case_a", "--set", "intervention.policies.0.name=teleport"], "teleport"),
-        (["case_a", "--set", "intervention.policies.0.parameters.warp=9"], "warp"),
-        (["case_a", "--set", "decision.noise_period_s=1e-9"], "allowed: 1e+07 steps, 8 GiB"),
-        (["case_a", "--limit-steps", "100", "--limit-memory", "0.1"], "allowed: 1e+02 steps, 0.1 GiB"),
-        ([], "a scenario is needed"),
-        (["case_a", "--format", "pdf"], "formats are html, json, junit"),
-    ],
-)
-def test_a_users_mistake_is_one_line_and_exit_code_2(
-    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    try:
-        code: object = main([*arguments, "-o", str(tmp_path / "out")])
-    except SystemExit as stopped:
-        code = stopped.code
-    error = capsys.readouterr().err
-    assert (code, error.count("\n")) == (2, 1)
-    assert said in error
-    assert not (tmp_path / "out" / "report.json").exists()
-
-
 def test_a_folder_that_cannot_be_used_is_refused_before_the_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,9 +21,9 @@ Report = Callable[[str], Path]
 
 ONE_RUN = ["--set", "reproduction=[]", "--set", "choices=[]", "--format", "json"]
 IN_A_RUN = (
-    "sys_exit_0", "os_exit_0", "os_exit_in_a_thread", "loops_and_swallows_everything", "text_holds_lone_surrogates",
+    "sys_exit_0", "os_exit_0", "loops_and_swallows_everything", "text_holds_lone_surrogates",
     "text_sleeps", "array_ends_the_process", "sends_garbage", "closes_every_descriptor", "patches_the_claims",
-    "patches_the_avoidance_layer", "leaves_a_child_behind",
+    "leaves_a_child_behind",
 )  # fmt: skip
 ONLY = "third-party code is imported and run only with --allow-plugins"
 
@@ -135,13 +135,6 @@ def test_a_policy_that_crashes_is_told_with_its_first_traceback_and_may_be_heard
         assert said[-1] == r"KeyError: 'no\x1b[31m plan'"
         assert sum("Traceback" in line for line in said) == 1
         assert all(line.isprintable() for line in said)
-
-
-@pytest.mark.parametrize("name", ["..:x", "a b:x", "a:x:y", ":x", "a:x()"])
-def test_names_of_no_module_are_one_line(name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    change = f"intervention.policies.0.name={json.dumps(name)}"
-    assert main(["case_a", "-o", str(tmp_path / "out"), "--allow-plugins", "--set", change]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
 
 
 @pytest.mark.slow

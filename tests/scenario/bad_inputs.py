@@ -22,9 +22,10 @@ from scenario.cases import DATA, DELETE, SMALL, SMALL_DATA, edit
 from airground_drake.base.errors import ScenarioError
 from airground_drake.scenario.document import MAX_BYTES
 from airground_drake.scenario.load import load
+from airground_drake.scenario.shipped import shipped_files
 
 TABLE = Path(__file__).with_suffix(".txt")
-FILE = "bad.yaml"
+FILE, SHIPPED = "bad.yaml", shipped_files()["minimal"].parent
 SHOWN = 200
 """Of a message, characters in the table: long lists of what is allowed are cut."""
 
@@ -239,9 +240,83 @@ OVERRIDES = [
     "runs.d.set.decision.threshold.zeta_m=-1",
     "seed=1\n2",
     "ugvs=null",
+    "faults={position_error_m: 0.1}",
+    "faults={late: 0.1}",
     f"ugvs={{{', '.join(f'r{k}: {{start_m: [{k}, 0, 0]}}' for k in range(50))}}}",
 ]
 """`--set` on case_a."""
+
+PLANTS = [
+    "{kind: unicycle}",
+    "{kind: unicycle, hand_point_m: 0.01}",
+    "{kind: unicycle, hand_point_m: 0.2, wheel_base_m: 0.3}",
+    "{kind: unicycle, hand_point_m: 0.2, delay_s: 0.1}",
+    "{kind: unicycle, hand_point_m: 3.0}",
+    "[{kind: delay, delay_s: 0.1}, {kind: unicycle, hand_point_m: 0.2}]",
+    "{kind: delay, delay_s: 0.03}",
+    "{kind: lag}",
+    "{kind: spring}",
+    "{sort: lag}",
+    "lag",
+    "[3]",
+    "{kind: ackermann, hand_point_m: 0.3, wheelbase_m: 0.3, max_steering_rad: 30}",
+    "{kind: ackermann, hand_point_m: 0.3, wheelbase_m: 0.3, max_steering_rad: 0.6, backwards: true}",
+    "{kind: ackermann, hand_point_m: 0.001, wheelbase_m: 0.3, max_steering_rad: 0.6}",
+    "{kind: weak.py:Weak, hand_point_m: 1.0}",
+    "{kind: lag, time_constant_s: 0.1, cover_m: 1.0}",
+    "[{kind: delay, delay_s: 0.05}, {kind: weak.py:Weak}]",
+    "{kind: weak.py:Weak, drift_m_s: 9.0}",
+]
+"""Of the UGV of minimal."""
+CAR = "uav.plant={kind: ackermann, hand_point_m: 0.3, wheelbase_m: 0.3, max_steering_rad: 0.6}"
+DRIFTS = "ugvs.ugv1.plant={kind: mine.py:Mine, drift_m_s: 0.1}"
+ERRORS = ["sensing={position_error_m: 0.05, errors: away}", "control.avoidance_gain_1_s=8"]
+MINE = "ugv_controller={kind: mine.py:Mine}"
+OLD = ["channel={ugvs: {delay_s: 0.3, loss: 0.1}}", "control.law=asynchronous", "runs={a: {method: a}, d: {method: d}}"]
+PRINTED = "runs={a: {method: a, composition: recursion_listed}}"
+TOGETHER = [
+    *(("minimal", [f"ugvs.ugv1.plant={plant}"]) for plant in PLANTS),
+    ("minimal", [CAR]),
+    ("minimal", ["ugvs.ugv1.plant={kind: weak.py:Weak, drift_m_s: 0.1}", "control.avoidance_gain_1_s=0"]),
+    # positions between UGVs that come late or are lost
+    ("swap", ["channel.ugvs={delay_s: 0.06}"]),
+    ("swap", ["channel.ugvs={delay_s: -0.1}"]),
+    ("swap", ["channel.ugvs={loss: 1.0}"]),
+    ("swap", ["channel.ugvs={loss: 0.2}", "runs={a: {method: a, set: {channel.ugvs.loss: 0.9}}}"]),
+    ("swap", ["channel.ugvs={loss: 0.2}", MINE]),
+    ("swap", ["channel.ugvs={loss: 0.2}", DRIFTS]),
+    ("swap", ["channel.ugvs={delay_s: 0.02}", DRIFTS]),
+    ("swap", ["channel.ugvs={loss: 0.2}", "sensing={position_error_m: 0.05}"]),
+    *(
+        ("swap", [*OLD, *more])
+        for more in (
+            ["channel=null"],
+            ["ugvs.ugv1.plant={kind: lag, time_constant_s: 0.1}"],
+            ["sensing={position_error_m: 0.01}"],
+            ["sensing={uav_error_m: 0.01}"],
+            ["runs={c: {method: c}}"],
+            [PRINTED],
+            [MINE],
+            ["ugvs.ugv2.target_m=[6, 1.1, 0]", "ugvs.ugv2.preset.waypoints_m.1=[6, 1.1, 0]"],
+            ["control.law=late"],
+        )
+    ),
+    # errors of measured positions
+    *(
+        ("swap", [*ERRORS, *more])
+        for more in (
+            ["control.avoidance_gain_1_s=3.6"],
+            ["control.avoidance_gain_1_s=0"],
+            ["obstacles.stone={position_m: [30, 30, 0], max_speed_m_s: 0.1}"],
+            [DRIFTS],
+            [PRINTED],
+            ["ugvs.ugv2.start_m=[-6, 1.1, 0]"],
+            ["sensing.position_error_m=-0.1"],
+            ["sensing.errors=loud"],
+        )
+    ),
+]
+"""A shipped scenario, and several `--set` that do not go together."""
 
 PATHS = ["", ".", "/", "a\0b", "no/such/file.yaml", "x" * 5000, "line\nbreak", "case-a"]
 
@@ -256,7 +331,7 @@ def messages(folder: Path) -> Iterator[str]:
         try:
             load(path, overrides)
         except ScenarioError as error:
-            return str(error).replace(f"{folder}/", "")
+            return str(error).replace(f"{folder}/", "").replace(f"{SHIPPED}/", "")
         return "accepted"
 
     for key, value in EDITS:
@@ -267,6 +342,8 @@ def messages(folder: Path) -> Iterator[str]:
         yield refusal(SMALL.replace(old, new), str(file), [])
     for override in OVERRIDES:
         yield refusal(None, "case_a", [override])
+    for name, overrides in TOGETHER:
+        yield refusal(None, name, overrides)
     for path in PATHS:
         yield refusal(None, path, [])
 

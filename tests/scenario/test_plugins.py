@@ -108,8 +108,8 @@ def test_what_is_not_found_says_where_it_was_looked_for(case_a: Scenario, tmp_pa
         pytest.fail("admitted")
 
 
-@pytest.mark.parametrize("name", ["../x.py:It", "/x.py:It", "a//x.py:It", "x.py:"])
-def test_a_file_is_one_below_a_folder_of_the_path(name: str) -> None:
+@pytest.mark.parametrize("name", ["../x.py:It", "/x.py:It", "a//x.py:It", "x.py:", "a b:x", "a:x:y", ":x", "a:x()"])
+def test_what_is_no_module_or_file_below_a_folder_of_the_path_names_no_code(name: str) -> None:
     assert not is_plugin(name)
 
 

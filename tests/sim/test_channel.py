@@ -108,15 +108,6 @@ def test_the_shipped_link_has_no_fault(run: Run, name: str) -> None:
     assert not faults_of(trace)
 
 
-def test_with_another_delay_the_same_messages_are_lost() -> None:
-    traces = [over(Channel(delay, loss=0.5), "case_b", "d", "duration_s=16", "reproduction=[]") for delay in (0.1, 0.2)]
-    sent = [trace.messages[trace.messages["sent_s"] < 15.0] for trace in traces]
-    lost = [table.set_index(["kind", "number", "attempt"])["received_s"].isna() for table in sent]
-    both = lost[0].index.intersection(lost[1].index)
-    assert len(both) > 8
-    assert (lost[0][both] == lost[1][both]).all()
-
-
 def test_a_motion_begins_when_it_can_have_arrived() -> None:
     trace = over(Channel(0.6), "case_b", "d", "duration_s=13", "reproduction=[]")
     assert len(trace.proposals)

@@ -50,46 +50,6 @@ def crossed() -> Trace:
     return simulate(load("two_uavs", {**CROSSED, "duration_s": 6.0}), "a")
 
 
-def test_each_uav_asks_its_own_ugvs_only_and_all_have_numbers_of_their_own(trace: Trace) -> None:
-    sent = proposals_of(trace)
-    assert {proposal.sender for proposal in sent} == {"north", "south"}
-    assert all(proposal.ugv in trace.scenario.in_charge(proposal.sender) for proposal in sent)
-    assert len({proposal.number for proposal in sent}) == len(sent)
-    parties = trace.messages.groupby(["kind", "sender", "receiver"]).size().index
-    assert {(a, b) for kind, a, b in parties if kind == "proposal"} == {
-        (uav, ugv) for uav in trace.uavs for ugv in trace.scenario.in_charge(uav)
-    }
-    assert all(a in trace.scenario.in_charge(b) for kind, a, b in parties if kind == "answer")
-
-
-def test_a_lost_uav_neither_sends_nor_hears_anything(trace: Trace, lost_s: float) -> None:
-    table = trace.messages
-    assert table[table["sender"] == "north"]["sent_s"].max() > lost_s
-    assert table[table["sender"] == "south"]["sent_s"].max() < lost_s
-    answers = table[(table["kind"] == "answer") & (table["receiver"] == "south")]
-    assert answers["read_s"].max() < lost_s
-    assert answers[answers["sent_s"] >= lost_s]["read_s"].isna().all()
-    assert trace.plans[trace.plans["uav"] == "south"]["t_s"].max() < lost_s
-
-
-def test_ugvs_of_a_lost_uav_drive_what_they_accepted_to_its_end(trace: Trace, lost_s: float) -> None:
-    t, driven = trace.sampled("t_s"), 0
-    for sent in (sent for sent in proposals_of(trace) if sent.sender == "south"):
-        executing = t[trace.sampled(f"{sent.ugv}.executing") == sent.number]
-        period = trace.scenario.intervention.period_s
-        assert executing.max() > lost_s
-        assert sent.times_s[-1] - period - 1e-9 <= executing.max() <= sent.times_s[-1] + period + 1e-9
-        driven += 1
-    assert driven == 4
-
-
-def test_all_arrive_and_nothing_is_found_wrong(trace: Trace) -> None:
-    assert {event["robot"] for event in trace.events if event["kind"] == "arrival"} == {*trace.robots}
-    for claim in ("SAFE-TRACE", "SAFE-HYP", "GATE-PLAN", "LIVE-HYP", "LIVE-GOAL"):
-        assert decided(claim, trace).status == "holds"
-    assert not faults_of(trace)
-
-
 def test_a_uav_alone_that_is_lost_helps_nobody_any_more(run: Run) -> None:
     trace = run("crossing", "d", set=["uav.lost_at_s=5", "duration_s=15"])
     assert trace.proposals.empty

@@ -10,13 +10,12 @@ import pytest
 from builders.observations import mate, seen
 from timeline import kinds
 
-from airground_drake.base.errors import PluginError, UnknownNameError
 from airground_drake.base.registry import POLICIES
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.scenario.schema import Policy as PolicyEntry
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.simulation import simulate
-from airground_drake.uav.database import BehaviourDatabase, Negotiation, make_policy
+from airground_drake.uav.database import BehaviourDatabase, Negotiation
 from airground_drake.uav.policy import Observation, Policy
 from airground_drake.uav.wrong import Hostile
 from airground_drake.verify import judge
@@ -63,20 +62,6 @@ def test_after_a_failure_the_next_policy_is_asked(case_a: Scenario) -> None:
         of_run = simulate(case_a, "d")
     assert "proposal" in kinds(of_run, "ugv1")
     assert re.fullmatch(r"test_policies\.py:\d+ RuntimeError: no plan", of_run.meta["faults"][0]["what"])
-
-
-@pytest.mark.parametrize(
-    ("name", "parameters", "said"),
-    [
-        ("nothing", {}, "allowed: detour"),
-        ("detour", {"speed": 3.0}, "speed"),
-        ("detour", {"speed_m_s": -1.0}, "speed_m_s > 0"),
-        ("detour", {"speed_m_s": 1.0, "follow_s": 601.0}, "follow_s from 0 to 600"),
-    ],
-)
-def test_policies_that_cannot_be_made(name: str, parameters: dict[str, float], said: str) -> None:
-    with pytest.raises((PluginError, UnknownNameError), match=said):
-        make_policy(name, parameters)
 
 
 class Hangs(Policy):

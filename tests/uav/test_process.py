@@ -16,7 +16,6 @@ from builders.observations import mate, seen
 
 from airground_drake.base.errors import PluginError, PolicyError
 from airground_drake.model.geometry.motion import Motion
-from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
@@ -57,7 +56,7 @@ def planned(database: BehaviourDatabase, held: Negotiation) -> tuple[dict[str, N
 def test_whatever_a_policy_does_counts_as_no_intervention(name: str, guests: dict[bool, GuestPolicy]) -> None:
     if name in TO_PARENT and not _confined():
         pytest.skip("this system cannot keep a process from changing others")
-    kind, before = KINDS[name], (Avoidance.apply, TraceClaim.judge)
+    kind, before = KINDS[name], TraceClaim.judge
     guest = guests[kind.hangs]
     database = BehaviourDatabase([("hostile", guest)], ranking="predicted")
     found, faults = planned(database, Negotiation(refusals=doing(name).refusals))
@@ -71,7 +70,7 @@ def test_whatever_a_policy_does_counts_as_no_intervention(name: str, guests: dic
         assert fault.what.isprintable()
         assert len(fault.what) <= 600
     assert [talk.proposal for talk in found.values()] == [None]
-    assert (Avoidance.apply, TraceClaim.judge) == before
+    assert TraceClaim.judge == before
     if not kind.tame or not guest._end.alive:
         guest.close()  # the next kind gets a new process
 

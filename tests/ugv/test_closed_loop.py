@@ -10,13 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.model.bodies.world import Body, World
-from airground_drake.model.geometry import outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.model.plants.first_order import FirstOrder
-from airground_drake.model.plants.unicycle import Unicycle
 from airground_drake.sim.blocks.controllers import UgvController
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.problem import Horizon, predicted_problem
@@ -73,35 +69,6 @@ def test_plans_are_those_of_the_running_controller(seed: int, on_top: bool, subs
     for mode in (0, 1):
         constant, _ = follow(loop, np.full(12, mode))
         np.testing.assert_allclose(constant, problem.positions(np.full(12, float(mode))), atol=1e-12)
-
-
-@examples(20)
-@given(st.integers(0, 10**6), st.booleans())
-def test_roll_outs_never_drive_backwards_either(seed: int, on_top: bool) -> None:
-    """A unicycle beside a disc that is to go anywhere: its controller, shortened, and its plant, step by step."""
-    rng = np.random.default_rng(seed)
-    law = UgvLaw(Avoidance(3.0, H, 4.0), 2.0, 1.5, on_top)
-    plant = Unicycle(0.3, H, heading_rad=rng.uniform(-np.pi, np.pi), max_turn_rad_s=2.0, backwards=False)
-    still, wanted = (Motion(np.zeros(1), np.array([[*rng.uniform(-2.0, 2.0, 2), 0.0]])) for _ in range(2))
-    proposal = Proposal("there", 0.0, wanted)
-    robot = Body("ugv1", "ugv", np.zeros(3), plant=plant, max_speed_m_s=1.0)
-    disc = Body("disc", "obstacle", np.array([2.6, 0.0, 0.0]), outline.balls(np.zeros(3), gap=2.0))
-    team = World((robot, Body("uav", "uav", FAR, plant=FirstOrder(), max_speed_m_s=9.0), disc), {}, 3.0)
-    controller, near, memory = UgvController(team, law), team.around(slice(0, 1)), plant.memory()
-    seen = view(np.zeros(3), still, disc.start_m[None], 2.0, 1.0, places=FAR[None], velocities=np.zeros((1, 3)))
-    seen = replace(
-        seen, distances=near.distance[0], shares=near.share[0], heading=float(memory[0]), steering=plant.steering
-    )
-    answers, position, ends = rng.integers(0, 2, 15), np.zeros(3), []
-    for k in range(15):
-        at, rate = still.at(k * H)
-        accepted = [proposal if answers[k] else None]
-        command = controller.velocity(k * H, np.array([position, FAR]), at[None], rate[None], accepted, memory)
-        controller.shorten(command, memory)
-        position, memory = position + H * command[0], plant.remembered(memory, command[0], H)
-        ends.append(position)
-    loop = closed_loop(seen, law, proposal, H * np.arange(16.0), np.tile(FAR, (16, 1, 1)))
-    np.testing.assert_allclose(follow(loop, answers)[0], ends, atol=1e-9)
 
 
 @pytest.mark.parametrize(("max_speed", "kept"), [(3.0, 1), (0.9, 0)])

@@ -50,13 +50,6 @@ def test_what_a_ugv_holds_depends_on_the_highest_number_alone(messages: list[Mes
     assert holds(*messages, *again) == expected
 
 
-def test_a_copy_after_its_withdrawal_is_not_taken_up_again() -> None:
-    assert holds(proposal(1), withdrawal(1), proposal(1)) is None
-    assert holds(withdrawal(1), proposal(1)) is None  # a withdrawal counts as read
-    assert holds(proposal(2), proposal(1)) == 2
-    assert holds(proposal(2), withdrawal(1)) == 2
-
-
 def answer(desk: Desk, asked: set[int], verdict: float, number: int, t: float, told: int = 1) -> Desk:
     """After a sample at which the UGV has this verdict on what it holds."""
     about = -1 if desk.held[0] is None else desk.held[0].number

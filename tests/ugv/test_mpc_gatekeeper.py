@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import pytest
 from builders.worlds import world
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +10,7 @@ from hypothesis import strategies as st
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.law.ugv_law import UgvLaw
-from airground_drake.uav.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.uav.messages import ACCEPT, REFUSE
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import Rules, settle
 from airground_drake.ugv.budget import Budget
@@ -25,33 +24,6 @@ COSTS = st.floats(0.1, 100.0)
 
 def solution(accept: float, refuse: float, status: Any = "optimal") -> Solution:
     return Solution(accept < refuse, status, objective=min(accept, refuse))
-
-
-@pytest.mark.parametrize(
-    ("accept", "refuse", "standing", "stood", "answer"),
-    [
-        (10.0, 10.5, SILENT, 0.0, (True, "cheaper")),
-        (10.5, 10.0, SILENT, 0.0, (False, "not_cheaper")),
-        (10.0 - 1e-9, 10.0, SILENT, 0.0, (False, "no_difference")),
-        (10.5, 10.0, ACCEPT, 1.0, (True, "kept")),
-        (10.0, 10.5, REFUSE, 1.0, (False, "kept")),
-        (20.0, 10.0, ACCEPT, 0.2, (False, "reversed")),
-        (10.0, 20.0, REFUSE, 0.2, (True, "reversed")),
-        (20.0, 10.0, ACCEPT, 0.15, (True, "dwell")),
-        (10.0, 20.0, REFUSE, 0.15, (False, "dwell")),
-    ],
-)
-def test_answers(accept: float, refuse: float, standing: float, stood: float, answer: tuple[bool, str]) -> None:
-    """Where keeping an answer throughout costs what the best plan costs that starts with it."""
-    assert settle(solution(accept, refuse), (accept, refuse), standing, stood, RULES) == answer
-    without = solution(accept, refuse, "refused_not_finite")
-    assert settle(without, (accept, refuse), standing, stood, RULES) == (False, "no_plan")
-
-
-def test_a_plan_that_accepts_later_is_refused_although_accepting_throughout_costs_less_than_refusing() -> None:
-    later = Solution(False, "optimal", objective=350.0)
-    assert settle(later, (350.3, 468.8), SILENT, 0.0, RULES) == (False, "waits")
-    assert settle(later, (350.3, 350.0 + 1e-7), SILENT, 0.0, RULES) == (False, "not_cheaper")
 
 
 @given(COSTS, COSTS, st.tuples(COSTS, COSTS), st.floats(0.0, 0.5), st.sampled_from([ACCEPT, REFUSE]))

@@ -126,24 +126,3 @@ def test_a_proposal_that_comes_after_its_motion_is_over_and_costs_no_try() -> No
     turn = team.sees(Proposal("way", 0.0, Motion(np.array([-2.0, team.t]), STAYS.positions), cause="other", number=0))
     assert (turn.executing, turn.tries, team.memory.answers[0]) == (False, 0, DONE)
     assert [decision.reason for decision in team.memory.decisions] == ["over"]
-
-
-def test_a_replaced_proposal_ends_its_try_whatever_becomes_of_the_next() -> None:
-    team = Team()
-    assert team.sees(making_way(0)).executing
-    turn = team.sees(making_way(1, cause="ugv"))
-    assert team.memory.answers[0] == REFUSE
-    assert (turn.executing, turn.tries, turn.since) == (False, 1, team.t)
-
-
-def test_a_ugv_rests_while_proposals_keep_coming() -> None:
-    """It refuses them as exhausted, and accepts the first one after its rest."""
-    team, said = Team(), []
-    for number in range(60):
-        team.sees(making_way(number))
-        said.append(team.memory.decisions[-1].reason)
-    first = said.index("exhausted")
-    assert said[:first] == ["makes_way"] * 2
-    again = first + said[first:].index("makes_way")
-    assert set(said[first:again]) == {"exhausted"}
-    assert again - first == pytest.approx(1.0 / 0.05, abs=1)  # a rest of 1 s

@@ -10,7 +10,6 @@ from builders.edits import bumped, dropped, rows, set_nan, with_meta, with_scena
 from builders.runs import passing_by, run_of
 from verify.judging import CLAIMS, GATE, UNRECORDED, decided
 
-from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace, load, save
 from airground_drake.verify import Finding, judge, judge_model
 from airground_drake.verify.claims.safe_budget import SafeBudget
@@ -71,8 +70,6 @@ def test_of_a_broken_trace_no_claim_passes(name: str) -> None:
         (Finding("ok", exercised=1), "ValueError: LIVE-GOAL found 'ok'"),  # type: ignore[arg-type]
         (Finding("holds", margin=-5.0, exercised=1), "ValueError: LIVE-GOAL found 'holds' with the margin -5.0"),
         (Finding("holds", margin="big", exercised=1), "ValueError: LIVE-GOAL found the margin 'big'"),  # type: ignore[arg-type]
-        (Finding("holds", exercised=-3), "ValueError: LIVE-GOAL was exercised -3 times; allowed: a whole number"),
-        (Finding("holds", exercised=1.5), "ValueError: LIVE-GOAL was exercised 1.5 times"),  # type: ignore[arg-type]
         (Finding("holds", exercised=1, figure={}), "ValueError: LIVE-GOAL found the figure dict; allowed: a Chart"),  # type: ignore[arg-type]
         (None, "AttributeError"),
     ],
@@ -103,23 +100,13 @@ def test_a_chart_that_cannot_be_drawn_is_refused(line: Any, log: str, why: str) 
 
 
 def test_a_claim_that_cannot_say_whether_it_applies_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def applies(self: Any, trace: Trace) -> bool:
+    def applies(self: Any, given: Any) -> bool:
         raise ValueError("applies")
 
-    monkeypatch.setattr(type(CLAIMS["LIVE-GOAL"]), "applies", applies)
-    (verdict,) = judge(run_of("d"), claims=["LIVE-GOAL"])
-    assert (verdict.status, verdict.evidence.error) == ("error", "ValueError: applies")
-
-
-def test_a_claim_about_the_model_that_cannot_say_whether_it_applies_is_an_error(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def applies(self: Any, scenario: Scenario) -> bool:
-        raise ValueError("applies")
-
-    monkeypatch.setattr(SafeBudget, "applies", applies)
-    (verdict,) = judge_model(run_of("d").scenario, claims=["SAFE-BUDGET"])
-    assert (verdict.status, verdict.evidence.error) == ("error", "ValueError: applies")
+    for kind in (type(CLAIMS["LIVE-GOAL"]), SafeBudget):
+        monkeypatch.setattr(kind, "applies", applies)
+    verdicts = judge(run_of("d"), claims=["LIVE-GOAL"]) + judge_model(run_of("d").scenario, claims=["SAFE-BUDGET"])
+    assert [(each.status, each.evidence.error) for each in verdicts] == [("error", "ValueError: applies")] * 2
 
 
 def test_a_count_of_numpy_is_a_count() -> None:

@@ -164,16 +164,6 @@ def test_start_inside_discs(angle: float, depth: float, goal: Point, discs: list
     assert path.length_m >= leg + math.dist(leave.tolist(), goal) - 1e-9
 
 
-@given(point, point, scene)
-def test_a_path_among_many_discs_is_found_from_those_in_its_way(start: Point, goal: Point, discs: list[Disc]) -> None:
-    at_once = length_or_inf(start, goal, discs)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paths, "FEW", 0)
-        assert length_or_inf(start, goal, discs) == pytest.approx(at_once, abs=1e-7)
-        patch.setattr(paths, "SEARCHES", 0)  # others beside these enter the graph, too
-        assert length_or_inf(start, goal, discs) == pytest.approx(at_once, abs=1e-7)
-
-
 def test_a_way_along_a_wall_of_many_parts_takes_few_searches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Round one disc the next is in the way, and so on to the end of the wall."""
     discs = [(0.4 * k, 0.4 * k, 0.3) for k in range(-80, 81)]

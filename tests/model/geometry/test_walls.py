@@ -21,10 +21,11 @@ coordinate = st.integers(-4, 44).map(lambda n: n / 4.0 + 0.1)
 point = st.tuples(coordinate, coordinate)
 
 
-def lacking(place: Point | Array, rows: Array, keep: Array) -> Array:
-    """By how much a place is too near to each core, m; inside a polygon all of the distance."""
-    here = np.array([place], dtype=np.float64)
-    return keep - np.array([from_core(here, here, outline.corners_of(row))[0] for row in rows])
+def lacking(places: Point | Array, rows: Array, keep: Array) -> Array:
+    """By how much places are too near to each core, (K, m), m; inside a polygon all of the distance."""
+    here = np.array(places, dtype=np.float64).reshape(-1, 2)
+    apart = [from_core(here, here, outline.corners_of(row)) for row in rows]
+    return keep - np.array(apart).reshape(len(rows), len(here)).T
 
 
 def length_or_inf(start: Point, goal: Point, rows: Array, keep: Array) -> float:
@@ -108,7 +109,7 @@ def test_the_start_leaves_by_the_nearest_place_of_the_boundary(start: Point) -> 
     left = path.at(out)[0]
     assert lacking(left, rows, keep).max() == pytest.approx(0.0, abs=TOL)
     ring = start + 0.9999 * out * np.column_stack([np.cos(turn), np.sin(turn)])
-    assert min(float(lacking(place, rows, keep).max()) for place in ring) > 0.0
+    assert lacking(ring, rows, keep).max(axis=1).min() > 0.0
 
 
 def test_a_start_deep_inside_a_row_of_walls_leaves_all_of_them() -> None:
@@ -135,10 +136,12 @@ def test_a_path_is_shortest_and_keeps_its_distances(start: Point, goal: Point, f
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(paths, "FEW", 0)
         assert length_or_inf(start, goal, rows, keep) == pytest.approx(best, abs=1e-7)
+        patch.setattr(paths, "SEARCHES", 0)  # others beside these enter the graph, too
+        assert length_or_inf(start, goal, rows, keep) == pytest.approx(best, abs=1e-7)
     if math.isfinite(best):
         path = shortest_path(start, goal, rows, keep)
         places = np.array([path.at(s)[0] for s in np.linspace(0.0, best, 60)])
-        assert max(float(lacking(place, rows, keep).max()) for place in places) < TOL
+        assert lacking(places, rows, keep).max() < TOL
 
 
 @pytest.mark.parametrize(
@@ -165,23 +168,19 @@ def test_looking_up_outlines_changes_nothing(drawn: list[Array], count: int, see
     rng, keep = np.random.default_rng(seed), np.resize([0.25, 0.5, 1.0], len(rows))
     begin = np.round(4.0 * rng.uniform(-2.0, 12.0, (count, 2))) / 4.0
     end = begin + rng.normal(size=(count, 2)) * rng.choice([0.0, 0.3, 4.0], (count, 1))
-    one_by_one = [convex.points_are_free(each[None], rows, keep)[0] for each in begin]
+    one_by_one = [convex.points_are_free(place[None], rows, keep)[0] for place in begin]
     assert convex.points_are_free(begin, rows, keep).tolist() == one_by_one
-    for k, free in enumerate(one_by_one):
-        assert free == (lacking(begin[k], rows, keep).max(initial=-1.0) <= 0.0)
-    segments = convex.segments_are_free(begin, end, rows, keep, 1e-9)
-    for k in range(count):
-        alone = [
-            convex.passes(row, far, *begin[k], *end[k], 1e-9) for row, far in zip(rows, keep.tolist(), strict=True)
-        ]
-        assert segments[k] == all(alone)
-        for row, far, free in zip(rows, keep.tolist(), alone, strict=True):
-            nearest = from_core(begin[k : k + 1], end[k : k + 1], outline.corners_of(row))[0]
-            ends = far - max(
-                lacking(begin[k], row[None], np.array([far]))[0], lacking(end[k], row[None], np.array([far]))[0]
-            )
-            assert free or nearest < far
-            assert not free or nearest >= min(far, ends) - 1e-8
+    first, last = lacking(begin, rows, keep), lacking(end, rows, keep)
+    assert one_by_one == (first.max(axis=1, initial=-1.0) <= 0.0).tolist()
+    alone = np.array([
+        [convex.passes(row, far, *one, *other, 1e-9) for row, far in zip(rows, keep.tolist(), strict=True)]
+        for one, other in zip(begin, end, strict=True)
+    ]).reshape(count, len(rows))  # fmt: skip
+    assert convex.segments_are_free(begin, end, rows, keep, 1e-9).tolist() == alone.all(axis=1).tolist()
+    for row, far, free, ends in zip(rows, keep, alone.T, np.maximum(first, last).T, strict=True):
+        nearest = from_core(begin, end, outline.corners_of(row))
+        assert (free | (nearest < far)).all()
+        assert (~free | (nearest >= np.minimum(far, far - ends) - 1e-8)).all()
 
 
 def test_a_distance_field_is_exact_in_sight_and_little_longer_round_walls() -> None:
@@ -258,10 +257,7 @@ def test_which_arcs_are_covered(field: tuple[Array, Array], begin: float, sweep:
     found = convex.arcs_are_covered(centres, radii, np.full(20, begin), np.full(20, sweep), rows, keep)
     angles = begin + sweep * np.linspace(0.0, 1.0, 200)
     unit = np.column_stack([np.cos(angles), np.sin(angles)])
-    for covered, centre, radius in zip(found.tolist(), centres, radii.tolist(), strict=True):
-        apart = np.array(
-            [from_core(arc, arc, outline.corners_of(row)) for row in rows for arc in [centre + radius * unit]]
-        )
-        outside = (apart - keep[:, None]).min(axis=0).max()
-        assert not covered or outside < 1e-9
-        assert covered or (apart - keep[:, None]).max(axis=1).min() > -0.15 * radius
+    arcs = centres[:, None] + radii[:, None, None] * unit
+    lacks = lacking(arcs, rows, keep).reshape(*arcs.shape[:2], len(rows))
+    assert (~found | (lacks.max(axis=2).min(axis=1) > -1e-9)).all()
+    assert (found | (lacks.min(axis=1).max(axis=1) < 0.15 * radii)).all()

@@ -138,6 +138,15 @@ def test_robots_in_contact_slide_along() -> None:
         assert kernels.avoid_one(lower, normal, np.zeros(1), kernels.AUGMENTED) @ lower == pytest.approx(4.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(("normal", "bound"), [((-4e-6, 0.0, 0.0), -20.0), ((1.0, 0.0, 0.0), -5.0)])
+def test_exactly_below_the_uav_and_inside_its_safe_distance_a_ugv_stands(
+    normal: tuple[float, ...], bound: float
+) -> None:
+    """No velocity on the ground helps: it does not run to where the bound of something else is, at 5000 km/s."""
+    normals, bounds = np.array([[0.0, 0.0, 0.0], normal]), np.array([6.0, bound])
+    assert not kernels.avoid_one(np.array([1.0, 0.0, 0.0]), normals, bounds, kernels.AUGMENTED).any()
+
+
 @pytest.mark.parametrize("apart", [1e-8, 1e-6, 1e-4])
 def test_a_small_contradiction_is_one(apart: float) -> None:
     """Between two walls that both push, by little: no wish has a say, or a hostile one would set the speed."""

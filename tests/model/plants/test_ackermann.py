@@ -3,13 +3,11 @@
 import math
 
 import numpy as np
-import pytest
 from builders.worlds import beside_a_wall
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
-from airground_drake.base.errors import ScenarioError
 from airground_drake.check import safety
 from airground_drake.check.run import Run, _moves_as_commanded
 from airground_drake.model.plants.ackermann import Ackermann
@@ -71,20 +69,3 @@ def test_a_command_outside_makes_it_stand() -> None:
         velocity = np.array(command)
         assert steer(velocity, 0.0, plant.steering, H)[0] == (0.0 if stands else 1.0)
         assert velocity.any() != stands
-
-
-@pytest.mark.parametrize(
-    ("edit", "says"),
-    [
-        (
-            "ugvs.ugv1.plant.max_steering_rad=30",
-            "max_steering_rad: 30.0 is not allowed; wanted: an angle in rad above 0",
-        ),
-        ("ugvs.ugv1.plant.backwards=true", "backwards: unknown key; it is a key of unicycle; keys of ackermann: kind"),
-        ("ugvs.ugv1.plant.hand_point_m=0.001", "else the axle could swing round within a period"),
-        (f"uav.plant={CAR}", "another kind: a UAV is no car"),
-    ],
-)
-def test_what_a_car_cannot_be_is_refused(edit: str, says: str) -> None:
-    with pytest.raises(ScenarioError, match=says):
-        load("minimal", [f"ugvs.ugv1.plant={CAR}", "uav.altitude_m=3", "uav.start_m=[0, 0, 3]", edit])

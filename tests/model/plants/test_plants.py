@@ -15,7 +15,6 @@ from pydrake.systems.analysis import Simulator
 from scipy.integrate import solve_ivp
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import ScenarioError
 from airground_drake.check.plants import law_m, taken
 from airground_drake.model.bodies.world import Body
 from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance
@@ -315,25 +314,3 @@ def test_a_monitor_knows_what_unicycles_can_do() -> None:
     simulator.get_mutable_context().SetAccuracy(1e-6)
     simulator.AdvanceTo(1.0)
     assert monitor.violation(monitor.GetMyContextFromRoot(simulator.get_context())) is None
-
-
-@pytest.mark.parametrize(
-    ("plant", "says"),
-    [
-        ("{kind: unicycle}", "hand_point_m: missing; wanted: more than 0 m"),
-        ("{kind: unicycle, hand_point_m: 0.01}", "else the axle could swing round within a period"),
-        ("{kind: unicycle, hand_point_m: 0.2, wheel_base_m: 0.3}", "go together"),
-        ("{kind: unicycle, hand_point_m: 0.2, delay_s: 0.1}", "unknown key; it is a key of delay; keys of unicycle"),
-        ("{kind: unicycle, hand_point_m: 3.0}", "Largest term: hand_point_m"),
-        ("[{kind: delay, delay_s: 0.1}, {kind: unicycle, hand_point_m: 0.2}]", "no theorem covers another combination"),
-        ("{kind: delay, delay_s: 0.03}", "a whole multiple of control.period_s"),
-        ("{kind: lag}", "time_constant_s: missing; wanted: a number in s"),
-        ("{kind: spring}", "one of first_order, unicycle, ackermann, lag, delay"),
-        ("{sort: lag}", "ugvs.ugv1.plant.sort: unknown key; keys of first_order, the default: kind"),
-        ("lag", "ugvs.ugv1.plant: 'lag' is not allowed; wanted: a mapping with a kind, one of first_order, unicycle"),
-        ("[3]", "ugvs.ugv1.plant.0: 3 is not allowed; wanted: a mapping with a kind"),
-    ],
-)
-def test_plants_that_no_theorem_covers_are_refused(plant: str, says: str) -> None:
-    with pytest.raises(ScenarioError, match=says.replace("[", r"\[")):
-        load("minimal", [f"ugvs.ugv1.plant={plant}"])

@@ -76,14 +76,6 @@ def test_free_cells_that_no_robot_reaches_are_filled(grid: Grid, robots: list[tu
     assert filled[1:] == grid[1:]
 
 
-def test_around_a_closed_room_its_inside_is_filled() -> None:
-    room = np.ones((4, 5), bool)
-    room[1:3, 1:4] = False
-    for robot in ((-9.0, 1.0), (2.0, 99.0)):
-        assert Grid(room, Frame(1.0)).filled([robot]).occupied.all()
-    assert np.array_equal(Grid(room, Frame(1.0)).filled([(1.5, 1.5), (-9.0, 1.0)]).occupied, room)
-
-
 @given(grid=GRIDS)
 def test_clearance_is_at_most_the_distance_from_the_nearest_occupied_cell(grid: Grid) -> None:
     found = grid.clearance()

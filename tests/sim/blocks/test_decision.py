@@ -98,16 +98,6 @@ def straight(*ends: Sequence[float]) -> Path:
     return Path(np.arange(len(ends), dtype=np.float64), error, np.zeros((len(ends), 1)))
 
 
-def test_a_dip_below_the_release_level_within_a_step_is_a_release() -> None:
-    """The error passes the origin at 0.5 m between two updates; at both x is above the threshold."""
-    path = straight((4.0, 0.5, 0.0), (-4.0, 0.5, 0.0))
-    reached = (4.0 - np.sqrt(1.0 - 0.25)) / 8.0
-    status = run(TRIGGER, path, 1.0)
-    assert times(status, 3) == [pytest.approx(reached, abs=2e-6)]
-    assert len(times(status, 2)) == 2
-    assert times(status, 2)[1] == pytest.approx((4.0 + np.sqrt(9.0 - 0.25)) / 8.0, abs=2e-6)
-
-
 def simulator_of(x: System, trigger: Trigger, accuracy: float | None = 1e-6) -> tuple[Simulator, VectorLogSink]:
     """A trigger whose range is x now, with nothing else in the diagram that is sampled; and a log of its status."""
     builder = DiagramBuilder()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import faults_of
+from oracles import ORACLES, faults_of
 from sim.blocks.test_positions import ABOUT_D, APART_M, PERIOD_S, checked, forged, found, least_m, team
 
 from airground_drake.base.arrays import Array
@@ -90,24 +90,23 @@ class Forgetful(AsynchronousUgvController):
 
 def test_who_ignores_the_age_breaks_distances_and_both_programs_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("airground_drake.sim.blocks.positions.AsynchronousUgvController", Forgetful)
-    traces = [simulate(old_team(seed, 0.3, 0.5), "a") for seed in range(4)]
-    assert sum(least_m(trace) < APART_M - 1e-3 for trace in traces) >= 3
-    for trace in traces:
+    for seed in (0, 1):
+        trace = simulate(old_team(seed, 0.3, 0.5), "a")
+        assert least_m(trace) < APART_M - 1e-3
         assert found(trace, "SAFE-HYP") == {"SAFE-HYP": "refuted"}
         assert safety.safe_hyp(checked(trace)).status == "refuted"
-        assert "commands" in faults_of(trace)
+        assert ORACLES["commands"](trace)
 
 
 def test_a_position_that_is_older_than_it_was_is_found() -> None:
     trace = run(0, 0.1, 0.5)
-    pairs = [(one, other) for one in trace.ugvs for other in trace.ugvs if one != other]
     judged = 0
-    for first, second in pairs:
+    for first, second in permutations(trace.ugvs, 2):
         heard = trace.sampled(f"{first}.heard_{second}_s")
         old = replace(
             trace, samples=trace.samples.assign(**{f"{first}.heard_{second}_s": np.maximum(heard - 1.0, 0.0)})
         )
-        assert "positions" in faults_of(old)
+        assert ORACLES["positions"](old)
         ours, theirs = found(old, "SAFE-HYP")["SAFE-HYP"], safety.safe_hyp(checked(old)).status
         assert ours == theirs
         judged += ours == "refuted"
@@ -191,29 +190,6 @@ def test_plans_keep_what_the_law_keeps_and_the_budget_tells_it() -> None:
     kept = [pair.unsure_m for pair in budget(scenario) if pair.kind == "ugv"]
     assert max(kept) == pytest.approx(4 * PERIOD_S * fastest)
     assert SafeBudget().judge(SafeBudget().inputs(scenario)).status == "proved"
-
-
-LAG = {"ugvs.ugv1.plant": {"kind": "lag", "time_constant_s": 0.1}}
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"channel": None}, r"control\.law: .*asynchronous.*channel\.ugvs: \{\} would do"),
-        (LAG, r"ugvs\.ugv1\.plant: .*first_order with control\.law: asynchronous"),
-        ({"sensing": {"position_error_m": 0.01}}, "sensing: .*no theorem is about old positions with errors"),
-        ({"sensing": {"uav_error_m": 0.01}}, "sensing: "),
-        ({"runs": {"c": {"method": "c"}}}, r"runs\.c\.method: .*a or d with control\.law: asynchronous"),
-        ({"runs": {"a": {"method": "a", "composition": "recursion_listed"}}}, "augmented with control.law"),
-        ({"ugv_controller": {"kind": "mine.py:Mine"}}, "a controller of your own knows all positions"),
-        ({"ugvs.ugv2.target_m": [-4.0, 0.0, 0.0], "ugvs.ugv1.target_m": [-4.0, 0.9, 0.0]}, r"ugv2\.target_m: .* old"),
-        ({"control.law": "late"}, "shared, asynchronous"),
-    ],
-)
-def test_what_no_theorem_covers_is_refused(changes: dict[str, Any], said: str) -> None:
-    data = resolved(old_team(0, 0.3, 0.1)) | {key: changes[key] for key in changes if "." not in key}
-    with pytest.raises(ScenarioError, match=said):
-        from_data(data, "test", {key: changes[key] for key in changes if "." in key})
 
 
 def test_a_method_that_is_not_among_the_runs_is_refused_too() -> None:

@@ -297,26 +297,3 @@ def test_a_class_in_a_scenario_needs_leave_and_takes_numbers(tmp_path: Path) -> 
     assert np.array_equal(trace.position("ugv1"), again.position("ugv1"))
     assert trace.samples.equals(again.samples)
     build_diagram(plugins.without(scenario))  # imports nothing
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        (
-            "{kind: weak.py:Weak, hand_point_m: 1.0}",
-            "keys of a plant of your own: kind, drift_m_s, cover_m",
-        ),
-        ("{kind: lag, time_constant_s: 0.1, cover_m: 1.0}", "keys of lag: kind, time_constant_s"),
-        ("[{kind: delay, delay_s: 0.05}, {kind: weak.py:Weak}]", "one plant, .*: a plant of your own does everything"),
-        ("{kind: sideways}", "one of first_order, unicycle, ackermann, lag, delay, module:Class or file.py:Class"),
-        ("{kind: weak.py:Weak, drift_m_s: 9.0}", r"Largest term: drift_m_s"),
-    ],
-)
-def test_keys_of_plants_are_checked(given: str, said: str) -> None:
-    with pytest.raises(ScenarioError, match=said):
-        load("minimal", [f"ugvs.ugv1.plant={given}"])
-
-
-def test_a_drift_needs_a_gain() -> None:
-    with pytest.raises(ScenarioError, match=r"without control\.avoidance_gain_1_s nothing makes up for a drift"):
-        load("minimal", ["ugvs.ugv1.plant={kind: weak.py:Weak, drift_m_s: 0.1}", "control.avoidance_gain_1_s=0"])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from properties import examples
 from sim.blocks.both_programs import broken_rules, checked, found
 
-from airground_drake.base.errors import PluginError, ScenarioError
+from airground_drake.base.errors import PluginError
 from airground_drake.check import safety
 from airground_drake.model.bodies.world import Body
 from airground_drake.model.law import kernels
@@ -109,23 +109,6 @@ def test_the_model_says_what_the_budget_needs() -> None:
     terms = {pair.kind: (pair.gap_m - pair.promised_m, [term.key for term in pair.terms]) for pair in budget(scenario)}
     assert terms["ugv"] == (pytest.approx(0.1083, abs=5e-5), ["position_error_m"])
     assert terms["obstacle"] == (pytest.approx(0.0514, abs=5e-5), ["position_error_m"])
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"control.avoidance_gain_1_s": 5.6}, r"avoidance_gain_1_s: 5.6 .*at least 5\.64\d+ 1/s .*stand for the other"),
-        ({"control.avoidance_gain_1_s": 0.0}, "at least"),
-        ({"obstacles.rock.max_speed_m_s": 0.1}, "0, or rock at rest: beside what may move"),
-        ({"runs.a.composition": "recursion_listed"}, "augmented: robots stand"),
-        ({"ugvs.ugv2.start_m": [-4.33, 0.0, 0.0]}, r"needs 0\.71 m in the law .*they start 0\.67 m apart"),
-        ({"sensing.position_error_m": -0.1}, "a number in m from 0"),
-        ({"sensing.errors": "loud"}, "one of drawn, adversarial, away, sideways"),
-    ],
-)
-def test_scenarios_that_do_not_bear_the_errors_are_refused(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(ScenarioError, match=said):
-        from_data(resolved(crossing(errors="away")), "test", changes)
 
 
 def test_without_the_key_nothing_is_written_of_it_and_the_loop_makes_the_run() -> None:

@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import ScenarioError, SimulationError
+from airground_drake.base.errors import SimulationError
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
-from airground_drake.scenario.load import load
 from airground_drake.sim.batch import loop
 from airground_drake.sim.batch.loop import Team
 from airground_drake.sim.batch.run import Going
@@ -67,12 +66,6 @@ def test_a_row_says_which_hypothesis_broke_first(more: str, first: str, tmp_path
     assert of["SAFE-HYP"]["status"] == ("refuted" if first else "holds")
     assert of["SAFE-HYP"]["what"].startswith(first)
     assert of["SAFE-HYP"]["what"].endswith(" s") == bool(first)
-
-
-@pytest.mark.parametrize("faults", ["{position_error_m: 0.1}", "{late: 0.1}"])
-def test_a_fault_exceeds_what_is_declared(faults: str) -> None:
-    with pytest.raises(ScenarioError, match="0 without"):
-        load("minimal", [f"faults={faults}"])
 
 
 def test_a_row_for_each_run_and_claim(spec: Spec) -> None:

@@ -166,7 +166,7 @@ def test_robots_turn_round_in_a_dead_end(count: int) -> None:
     assert [way.tolist() for way in motions(again, tasks)] == [way.tolist() for way in ways]
 
 
-@pytest.mark.parametrize("rings", [2, 3])
+@pytest.mark.parametrize("rings", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_jam_dissolves_with_little_effort(rings: int) -> None:
     steps = [(a, b) for a, b in product(range(-rings, rings + 1), repeat=2) if abs(a + b) <= rings and (a, b) != (0, 0)]
     places = [(APART * (a + 0.5 * b), APART * np.sqrt(0.75) * b) for a, b in steps]

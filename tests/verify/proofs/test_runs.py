@@ -149,27 +149,6 @@ def test_distances_from_walls_prisms_and_bodies_that_move_are_proved(run: Simula
     assert law.entries == 3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("short_m", "kept"), [(5e-14, False), (-5e-14, True)])
-def test_some_rounding_errors_short_of_a_wall_is_too_short(
-    short_m: float, kept: bool, run: Simulations, workshop: Workshop
-) -> None:
-    few = short(run("case_a", "d"))
-    row = int(np.argmax(few.position(UGV)[:, 1]))
-    x, y, _ = few.position(UGV)[row]
-    wall = {"segment_m": [[x - 1.0, y + 0.9 - short_m], [x + 1.0, y + 0.9 - short_m]]}
-    distances, _, _ = prove(workshop, among_walls(few, wall_1=wall))
-    assert distances.proved is kept
-    assert [(one.demand.lemma, one.t_s) for one in distances.too_near] == (
-        [] if kept else [(f"{UGV}_and_wall_1", few.t[row])]
-    )
-    if not kept:
-        assert distances.too_near[0].short_m == pytest.approx(short_m, abs=2e-15)
-        assert distances.why.startswith(
-            f"Coq refuses {UGV} and wall_1, 0.9 m. In exact arithmetic {UGV} and wall_1 are"
-        )
-
-
 def test_a_wall_that_a_robot_steps_through_is_too_near(run: Simulations) -> None:
     few = short(run("case_a", "d"))
     x, y, z = few.position(UGV)[2]
