@@ -43,6 +43,7 @@ Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]  # from a scenario and its
 def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     """Make a report again and compare it: a line for each claim and each other part."""
     # judge: judges the claims; default: `judge_all`, without its cache.
+    from airground_drake.report.carried import off_channel
     from airground_drake.scenario.load import from_data, own
     from airground_drake.sim import trace
     from airground_drake.verify import judge_all
@@ -50,9 +51,10 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
     traces = {name: with_events(trace.load(folder / "trace" / name, name)) for name in scenario.runs}
-    unscripted = [line for name, run in traces.items() for line in off_script(run, own(scenario, name))]
-    if unscripted:
-        yield from unscripted
+    of_runs = [(run, own(scenario, name)) for name, run in traces.items()]
+    impossible = [line for of_run in of_runs for off in (off_script, off_channel) for line in off(*of_run)]
+    if impossible:
+        yield from impossible
         return  # what is judged on such a run is not about the scenario
     again = document_again(report, scenario, traces, judge or judge_all)
     other_code = _other_code(report["provenance"])

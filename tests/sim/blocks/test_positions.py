@@ -15,10 +15,11 @@ from airground_drake.check import safety
 from airground_drake.model.plants.budget import Bounds, law_distance, part_of_gain
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import Scenario
-from airground_drake.sim.blocks.positions import WaryUgvController, lost
+from airground_drake.sim.blocks.positions import WaryUgvController
 from airground_drake.sim.diagram import make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
+from airground_drake.uav.channel import lost
 from airground_drake.verify import judge
 
 PERIOD_S, APART_M = 0.05, 0.6

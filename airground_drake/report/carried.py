@@ -1,0 +1,131 @@
+"""What a trace says of messages, positions heard and proposals executed, against the scenario's channel.
+
+The fate of a message follows from the scenario alone, so no run is simulated for this.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from airground_drake.base.registry import method_of
+from airground_drake.report.lines import Line, different
+from airground_drake.scenario.links import make_links
+from airground_drake.scenario.schema import Channel, Scenario
+from airground_drake.sim.trace import Trace
+from airground_drake.uav.channel import Message, Transit, lost
+from airground_drake.verify.claim import TIME_TOLERANCE_S as SAME_S
+
+SAME_M = 1e-9
+Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and as it is due
+
+
+def off_channel(trace: Trace, scenario: Scenario) -> Iterator[Line]:
+    """A line for the first thing that cannot have been so."""
+    for of in (_spoken, _carried, _heard, _seen, _executed):
+        for about, t_s, theirs, ours in of(trace, scenario):
+            yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
+            return
+
+
+def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
+    """Messages are between a UAV and a UGV in its charge, not of a UAV that is lost, and read after they arrive."""
+    first = dict[int, tuple[Any, ...]]()
+    for row in trace.messages.to_dict("records"):
+        uav, ugv = (row["receiver"], row["sender"]) if row["kind"] == "answer" else (row["sender"], row["receiver"])
+        of_uav, t_s, number = scenario.aerial.get(uav), row["sent_s"], int(row["number"])
+        if of_uav is None or ugv not in scenario.in_charge(uav):
+            yield f"who sends {row['kind']} {number}", t_s, [row["sender"], row["receiver"]], "in charge, or asked"
+            continue
+        by_uav, until_s = row["read_s"] if row["kind"] == "answer" else t_s, of_uav.lost_at_s or math.inf
+        if by_uav >= until_s - SAME_S:
+            yield f"what {uav} sends or hears of {row['kind']} {number}", t_s, by_uav, f"before {until_s} s"
+        if not (row["read_s"] >= row["received_s"] - SAME_S or math.isnan(row["read_s"])):
+            yield f"reading of {row['kind']} {number}", t_s, row["read_s"], f"after {row['received_s']} s"
+        if row["kind"] == "proposal" and not row["attempt"]:
+            first[number] = ugv, uav, t_s
+    listed = (trace.proposals[name].tolist() for name in ("number", "robot", "sender", "issued_s"))
+    for number, *of_proposal in zip(*listed, strict=True):
+        if first.get(number) != tuple(of_proposal):
+            yield f"sending of proposal {number}", of_proposal[-1], of_proposal, first.get(number)
+
+
+def _carried(trace: Trace, scenario: Scenario) -> Wrong:
+    """Each message arrives when its link delivers it, and as often; what would arrive at the very end may not."""
+    table, ends = trace.messages, float(trace.sampled("t_s")[-1])
+    for back, link in enumerate(make_links(scenario.channel or Channel())):
+        rows = table[(table["kind"] == "answer") == bool(back)].to_dict("records")
+        sent, recorded = dict[tuple[Any, ...], Message](), dict[tuple[Any, ...], float]()
+        for row in rows:
+            message, ugv = (row["kind"], row["number"], row["attempt"]), row["sender" if back else "receiver"]
+            sent[message] = Message(*message[:2], row["about"], trace.ugvs.index(ugv), row["sent_s"], message[2])
+            recorded[*message, row["copy"]] = row["received_s"]
+        carried = link.carry(Transit(), [*sent.values()], math.inf)
+        due = {(m.kind, m.number, m.attempt, 0): math.nan for m in carried.lost}
+        for at_s, _, copy, m in carried.arrived:
+            due[m.kind, m.number, m.attempt, copy] = at_s
+        if len(rows) != len(recorded):
+            yield "rows of messages", 0.0, len(rows), len(recorded)
+        for kind, number, attempt in sent:
+            before = (kind, number, attempt - 1) if attempt else (kind, number - (kind != "proposal"), 0)
+            if -1 not in before and before not in sent:
+                yield f"what was sent before {kind} {number} (attempt {attempt})", 0.0, "nothing", list(before)
+        for key in {**recorded, **due}:
+            ours, theirs = due.get(key), recorded.get(key)
+            same = ours is not None and theirs is not None and (
+                abs(ours - theirs) <= SAME_S or (math.isnan(theirs) and not ours <= ends)
+            )  # fmt: skip
+            if not same:
+                what = "arrival of {} {} (attempt {}, copy {})".format(*key)
+                yield what, sent[key[:3]].sent_s, theirs, ours
+
+
+def _heard(trace: Trace, scenario: Scenario) -> Wrong:
+    """The last positions of each other that UGVs have, by the links between them."""
+    links, channel, late = scenario.ugv_links, scenario.channel, scenario.late_samples
+    if channel is None or links is None or not (links.loss or scenario.asynchronous):
+        return
+    n, h = len(trace.ugvs), scenario.control.period_s
+    last = np.zeros((n, n))
+    for k, t in enumerate(trace.sampled("t_s").tolist()):
+        if k >= late:
+            last[~lost(channel.seed, links.loss, n, k - late)] = t - late * h
+        for i, j in zip(*np.nonzero(~np.eye(n, dtype=np.bool_)), strict=True):
+            heard_s = trace.sampled(f"{trace.ugvs[i]}.heard_{trace.ugvs[j]}_s")[k]
+            if abs(heard_s - last[i, j]) > SAME_S:
+                yield f"last position of {trace.ugvs[j]} that {trace.ugvs[i]} has", t, heard_s, last[i, j]
+
+
+def _seen(trace: Trace, scenario: Scenario) -> Wrong:
+    """Where UAVs see UGVs is no farther off than the scenario says."""
+    most_m, rows = scenario.sensing.uav_error_m if scenario.sensing else math.inf, trace.sample_rows
+    for ugv in trace.ugvs if scenario.sensing else ():
+        seen = np.column_stack([trace.sampled(f"{ugv}.uav_saw_{axis}_m") for axis in "xyz"])
+        off = np.linalg.norm(seen - trace.position(ugv)[rows], axis=1)
+        for k in np.flatnonzero(off > most_m + SAME_M)[:1].tolist():
+            yield f"error of the UAV's position of {ugv}, m,", trace.t[rows[k]], off[k], f"at most {most_m}"
+
+
+def _executed(trace: Trace, scenario: Scenario) -> Wrong:
+    """A UGV executes what has arrived, and under a gatekeeper exactly what that accepts, unless it is withdrawn."""
+    times, period_s = trace.sampled("t_s"), scenario.gatekeeper.period_s
+    if scenario.ugv_controller is not None:
+        return
+    began: dict[int, float] = {}
+    for kind, number, at_s in zip(*(trace.messages[c].tolist() for c in ("kind", "about", "received_s")), strict=True):
+        if kind == "proposal":
+            began[number] = min(at_s, began.get(number, math.inf))
+    withdrawn = trace.messages[trace.messages["kind"] == "withdrawal"].groupby("about")["received_s"].min().to_dict()
+    said = {
+        (ugv, round(t / period_s)): number if answer == "accept" else -1
+        for ugv, t, number, answer in zip(
+            *(trace.decisions[name].tolist() for name in ("robot", "t_s", "number", "decision")), strict=True
+        )
+    }
+    for ugv in trace.ugvs:
+        for t, number in zip(times.tolist(), trace.sampled(f"{ugv}.executing").tolist(), strict=True):
+            due = said.get((ugv, int((t + SAME_S) / period_s)), -1) if method_of(trace.meta["method"]).gated else number
+            over = number == -1 and withdrawn.get(due, math.inf) <= t + SAME_S
+            if (number != due and not over) or (number >= 0 and began.get(number, math.inf) > t + SAME_S):
+                yield f"number of the proposal that {ugv} executes", t, number, due
