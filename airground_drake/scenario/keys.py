@@ -5,8 +5,8 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from airground_drake.base.arrays import LARGEST
 from airground_drake.base.registry import PLUGIN
-from airground_drake.base.values import LARGEST
 from airground_drake.scenario.json_schema import Schema, kind_of
 
 NOTHING = {"type": "null"}
