@@ -1,4 +1,4 @@
-"""Forged messages, positions heard and executions are found without simulating; honest runs have none."""
+"""Messages, positions heard, executions and references that a run cannot have had; an honest run has none."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from sim.blocks.test_positions import team
 
-from airground_drake.report.carried import off_channel
+from airground_drake.report.possible import impossible
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
@@ -80,8 +80,9 @@ FORGERIES: dict[str, tuple[str, Any]] = {
     "from a robot": ("who sends ", column("messages", "sender", lambda f: "ugv2", first(kind="proposal"))),
     "to another one": ("sending of proposal", column("proposals", "sender", lambda f: "ugv1")),
     "sent earlier": ("sending of proposal", column("proposals", "issued_s", lambda f: f["issued_s"] - 0.05)),
+    "about another one": ("sending of answer", column("messages", "about", lambda f: 9, first(kind="answer"))),
     "all positions heard": ("last position of ", column("samples", "ugv1.heard_ugv2_s", lambda f: f["t_s"])),
-    "the UAV saw nothing": ("error of the UAV's", column("samples", "ugv2.uav_saw_x_m", lambda f: 0.0)),
+    "another reference": ("velocity of the preset of ", column("samples", "ugv2.ref_vx_m_s", lambda f: 0.1)),
     "nothing executed": ("number of the proposal", lambda trace: replace(trace, samples=trace.samples.assign(
         **{f"{ugv}.executing": -1 for ugv in trace.ugvs}))),
     "refusals called acceptances": ("number of ", column("decisions", "decision", lambda f: "accept")),
@@ -92,27 +93,29 @@ FORGERIES: dict[str, tuple[str, Any]] = {
 @pytest.mark.parametrize("name", FORGERIES)
 def test_what_the_channel_does_not_allow_is_refused(name: str) -> None:
     due, edit = FORGERIES[name]
-    (line,) = off_channel(edit(run()), run().scenario)
+    (line,) = impossible(edit(run()), run().scenario)
     assert line["about"].startswith(due)
 
 
 def test_a_channel_that_is_declared_better_than_it_was_is_refused() -> None:
     for better in ({"loss": 0.0}, {"delay_s": 0.1}, {"duplicate": 0.0}):
         scenario = team(1, None, channel=CHANNEL | better, sensing=SENSING)
-        assert [*off_channel(run(), scenario)]
+        assert [*impossible(run(), scenario)]
 
 
 @pytest.mark.parametrize("method", ["b", "d"])
 def test_of_an_honest_run_nothing_is_said(method: str) -> None:
     assert len(run(method).messages)
-    assert [*off_channel(run(method), run(method).scenario)] == []
+    assert [*impossible(run(method), run(method).scenario)] == []
 
 
-def test_a_uav_that_is_lost_says_nothing_and_hears_nothing() -> None:
+def test_without_a_channel_answers_are_those_of_decisions_and_a_lost_uav_is_silent() -> None:
     honest = simulate(load("two_uavs", {"duration_s": 12.0}), "d")
-    assert [*off_channel(honest, honest.scenario)] == []
+    assert [*impossible(honest, honest.scenario)] == []
+    (line,) = impossible(only("decisions", lambda f: f[f["answer"] < 0])(honest), honest.scenario)
+    assert line["about"].startswith("sending of answer ")
     south = honest.messages["sender"].eq("south")
     for name, rows in (("sent_s", south), ("read_s", honest.messages["receiver"].eq("south"))):
         forged = column("messages", name, lambda f: 11.0, lambda f, rows=rows: rows)(honest)
-        (line,) = off_channel(forged, honest.scenario)
+        (line,) = impossible(forged, honest.scenario)
         assert line["about"].startswith("what south ")

@@ -1,4 +1,4 @@
-"""What a trace says of messages, positions heard and proposals executed, against the scenario's channel.
+"""What a run of a scenario cannot have had: messages, positions heard, executions and references.
 
 The fate of a message follows from the scenario alone, so no run is simulated for this.
 """
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.registry import method_of
+from airground_drake.model.geometry.motion import Motion
 from airground_drake.report.lines import Line, different
 from airground_drake.scenario.links import make_links
 from airground_drake.scenario.schema import Channel, Scenario
@@ -17,21 +18,34 @@ from airground_drake.sim.trace import Trace
 from airground_drake.uav.channel import Message, Transit, lost
 from airground_drake.verify.claim import TIME_TOLERANCE_S as SAME_S
 
-SAME_M = 1e-9
+CORNER_S = 1e-9  # a velocity so near to a corner of its preset, s, may be that of either side
+SAME_M_S = 1e-9
 Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and as it is due
 
 
-def off_channel(trace: Trace, scenario: Scenario) -> Iterator[Line]:
+def impossible(trace: Trace, scenario: Scenario) -> Iterator[Line]:
     """A line for the first thing that cannot have been so."""
-    for of in (_spoken, _carried, _heard, _seen, _executed):
+    for of in (_referred, _spoken, _carried, _heard, _executed):
         for about, t_s, theirs, ours in of(trace, scenario):
             yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
             return
 
 
+def _referred(trace: Trace, scenario: Scenario) -> Wrong:
+    """Velocities of the preset trajectories; the checker compares their places."""
+    t_s = trace.sampled("t_s")
+    for name, ugv in scenario.ugvs.items():
+        theirs = trace.reference_rate(name)
+        preset = Motion.at_speed(np.array(ugv.preset.waypoints_m), ugv.preset.speed_m_s)
+        both = [np.array([preset.at(t)[1] for t in t_s + by]) for by in (CORNER_S, -CORNER_S)]
+        off = np.min([np.abs(theirs - ours).max(axis=1) for ours in both], axis=0) > SAME_M_S
+        for k in np.flatnonzero(off)[:1]:
+            yield f"velocity of the preset of {name}, m/s,", t_s[k], theirs[k].tolist(), both[0][k].tolist()
+
+
 def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
     """Messages are between a UAV and a UGV in its charge, not of a UAV that is lost, and read after they arrive."""
-    first = dict[int, tuple[Any, ...]]()
+    first = dict[tuple[str, int], tuple[Any, ...]]()
     for row in trace.messages.to_dict("records"):
         uav, ugv = (row["receiver"], row["sender"]) if row["kind"] == "answer" else (row["sender"], row["receiver"])
         of_uav, t_s, number = scenario.aerial.get(uav), row["sent_s"], int(row["number"])
@@ -43,12 +57,18 @@ def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
             yield f"what {uav} sends or hears of {row['kind']} {number}", t_s, by_uav, f"before {until_s} s"
         if not (row["read_s"] >= row["received_s"] - SAME_S or math.isnan(row["read_s"])):
             yield f"reading of {row['kind']} {number}", t_s, row["read_s"], f"after {row['received_s']} s"
-        if row["kind"] == "proposal" and not row["attempt"]:
-            first[number] = ugv, uav, t_s
-    listed = (trace.proposals[name].tolist() for name in ("number", "robot", "sender", "issued_s"))
-    for number, *of_proposal in zip(*listed, strict=True):
-        if first.get(number) != tuple(of_proposal):
-            yield f"sending of proposal {number}", of_proposal[-1], of_proposal, first.get(number)
+        if not row["attempt"]:
+            first[row["kind"], number] = ugv, uav, t_s, row["about"]
+    listed = (trace.proposals[name].tolist() for name in ("number", "robot", "sender", "issued_s", "number"))
+    due = {("proposal", number): tuple(of_proposal) for number, *of_proposal in zip(*listed, strict=True)}
+    charge = {ugv: uav for uav in scenario.aerial for ugv in scenario.in_charge(uav)}
+    listed = (trace.decisions[name].tolist() for name in ("answer", "robot", "t_s", "number"))
+    due |= {("answer", k): (ugv, charge.get(ugv), *said) for k, ugv, *said in zip(*listed, strict=True) if k >= 0}
+    answers = [key for key in first if key[0] == "answer" and scenario.channel is None]
+    for key in dict.fromkeys([*due, *answers]):
+        theirs, ours = first.get(key), due.get(key)
+        if theirs != ours:
+            yield f"sending of {key[0]} {key[1]}", float((theirs or ours or (0.0,) * 3)[2]), theirs, ours
 
 
 def _carried(trace: Trace, scenario: Scenario) -> Wrong:
@@ -95,16 +115,6 @@ def _heard(trace: Trace, scenario: Scenario) -> Wrong:
             heard_s = trace.sampled(f"{trace.ugvs[i]}.heard_{trace.ugvs[j]}_s")[k]
             if abs(heard_s - last[i, j]) > SAME_S:
                 yield f"last position of {trace.ugvs[j]} that {trace.ugvs[i]} has", t, heard_s, last[i, j]
-
-
-def _seen(trace: Trace, scenario: Scenario) -> Wrong:
-    """Where UAVs see UGVs is no farther off than the scenario says."""
-    most_m, rows = scenario.sensing.uav_error_m if scenario.sensing else math.inf, trace.sample_rows
-    for ugv in trace.ugvs if scenario.sensing else ():
-        seen = np.column_stack([trace.sampled(f"{ugv}.uav_saw_{axis}_m") for axis in "xyz"])
-        off = np.linalg.norm(seen - trace.position(ugv)[rows], axis=1)
-        for k in np.flatnonzero(off > most_m + SAME_M)[:1].tolist():
-            yield f"error of the UAV's position of {ugv}, m,", trace.t[rows[k]], off[k], f"at most {most_m}"
 
 
 def _executed(trace: Trace, scenario: Scenario) -> Wrong:
