@@ -50,7 +50,12 @@ def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
         uav, ugv = (row["receiver"], row["sender"]) if row["kind"] == "answer" else (row["sender"], row["receiver"])
         of_uav, t_s, number = scenario.aerial.get(uav), row["sent_s"], int(row["number"])
         if of_uav is None or ugv not in scenario.in_charge(uav):
-            yield f"who sends {row['kind']} {number}", t_s, [row["sender"], row["receiver"]], "in charge, or asked"
+            yield (
+                f"who sends {row['kind']} {number}",
+                t_s,
+                [row["sender"], row["receiver"]],
+                "a UAV and one of its UGVs",
+            )
             continue
         by_uav, until_s = row["read_s"] if row["kind"] == "answer" else t_s, of_uav.lost_at_s or math.inf
         if by_uav >= until_s - SAME_S:
@@ -98,7 +103,7 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
             )  # fmt: skip
             if not same:
                 what = "arrival of {} {} (attempt {}, copy {})".format(*key)
-                yield what, sent[key[:3]].sent_s, theirs, ours
+                yield what, sent[key[:3]].sent_s, *("never" if at is None or math.isnan(at) else at for at in (theirs, ours))
 
 
 def _heard(trace: Trace, scenario: Scenario) -> Wrong:
@@ -114,7 +119,7 @@ def _heard(trace: Trace, scenario: Scenario) -> Wrong:
         for i, j in zip(*np.nonzero(~np.eye(n, dtype=np.bool_)), strict=True):
             heard_s = trace.sampled(f"{trace.ugvs[i]}.heard_{trace.ugvs[j]}_s")[k]
             if abs(heard_s - last[i, j]) > SAME_S:
-                yield f"last position of {trace.ugvs[j]} that {trace.ugvs[i]} has", t, heard_s, last[i, j]
+                yield f"last position of {trace.ugvs[j]} that {trace.ugvs[i]} has", t, float(heard_s), float(last[i, j])
 
 
 def _executed(trace: Trace, scenario: Scenario) -> Wrong:
