@@ -97,13 +97,10 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
             if -1 not in before and before not in sent:
                 yield f"what was sent before {kind} {number} (attempt {attempt})", 0.0, "nothing", list(before)
         for key in {**recorded, **due}:
-            ours, theirs = due.get(key), recorded.get(key)
-            same = ours is not None and theirs is not None and (
-                abs(ours - theirs) <= SAME_S or (math.isnan(theirs) and not ours <= ends)
-            )  # fmt: skip
-            if not same:
-                what = "arrival of {} {} (attempt {}, copy {})".format(*key)
-                yield what, sent[key[:3]].sent_s, *("never" if at is None or math.isnan(at) else at for at in (theirs, ours))
+            theirs, ours = recorded.get(key, math.nan), due.get(key, math.nan)
+            if not (abs(ours - theirs) <= SAME_S or (math.isnan(theirs) and not ours <= ends)):
+                both = ("never" if math.isnan(at) else at for at in (theirs, ours))
+                yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, *both
 
 
 def _heard(trace: Trace, scenario: Scenario) -> Wrong:
