@@ -99,8 +99,8 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
         for key in {**recorded, **due}:
             theirs, ours = recorded.get(key, math.nan), due.get(key, math.nan)
             if not (abs(ours - theirs) <= SAME_S or (math.isnan(theirs) and not ours <= ends)):
-                both = ("never" if math.isnan(at) else at for at in (theirs, ours))
-                yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, *both
+                told, due_s = ("never" if math.isnan(at) else at for at in (theirs, ours))
+                yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, told, due_s
 
 
 def _heard(trace: Trace, scenario: Scenario) -> Wrong:
