@@ -49,13 +49,9 @@ def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
     for row in trace.messages.to_dict("records"):
         uav, ugv = (row["receiver"], row["sender"]) if row["kind"] == "answer" else (row["sender"], row["receiver"])
         of_uav, t_s, number = scenario.aerial.get(uav), row["sent_s"], int(row["number"])
-        if of_uav is None or ugv not in scenario.in_charge(uav):
-            yield (
-                f"who sends {row['kind']} {number}",
-                t_s,
-                [row["sender"], row["receiver"]],
-                "a UAV and one of its UGVs",
-            )
+        if of_uav is None or ugv not in scenario.in_charge(uav) or not 0.0 <= t_s <= trace.t[-1]:
+            said = f"{row['sender']} to {row['receiver']}, at {t_s:.9g} s"
+            yield f"who sends {row['kind']} {number}", 0.0, said, "a UAV and one of its UGVs, in the run"
             continue
         by_uav, until_s = row["read_s"] if row["kind"] == "answer" else t_s, of_uav.lost_at_s or math.inf
         if by_uav >= until_s - SAME_S:

@@ -78,6 +78,7 @@ FORGERIES: dict[str, tuple[str, Any]] = {
     "a row twice": ("rows of messages", only("messages", lambda f: pd.concat([f, f.tail(1)]))),
     "read before it arrives": ("reading of ", column("messages", "read_s", lambda f: f["sent_s"])),
     "from a robot": ("who sends ", column("messages", "sender", lambda f: "ugv2", first(kind="proposal"))),
+    "sent after the end": ("who sends ", column("messages", "sent_s", lambda f: 1e18)),
     "to another one": ("sending of proposal", column("proposals", "sender", lambda f: "ugv1")),
     "sent earlier": ("sending of proposal", column("proposals", "issued_s", lambda f: f["issued_s"] - 0.05)),
     "about another one": ("sending of answer", column("messages", "about", lambda f: 9, first(kind="answer"))),
