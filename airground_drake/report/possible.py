@@ -25,7 +25,7 @@ Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and 
 
 def impossible(trace: Trace, scenario: Scenario) -> Iterator[Line]:
     """A line for the first thing that cannot have been so."""
-    for of in (_referred, _spoken, _carried, _heard, _executed):
+    for of in (_referred, _spoken, _carried, heard_otherwise, _executed):
         for about, t_s, theirs, ours in of(trace, scenario):
             yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
             return
@@ -99,8 +99,8 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
                 yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, told, due_s
 
 
-def _heard(trace: Trace, scenario: Scenario) -> Wrong:
-    """The last positions of each other that UGVs have, by the links between them."""
+def heard_otherwise(trace: Trace, scenario: Scenario) -> Wrong:
+    """The last positions of each other that UGVs have are those that their links delivered."""
     links, channel, late = scenario.ugv_links, scenario.channel, scenario.late_samples
     if channel is None or links is None or not (links.loss or scenario.asynchronous):
         return

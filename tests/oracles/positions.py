@@ -1,12 +1,13 @@
 """Positions between UGVs over links: which messages arrive, what is announced, who stands and who is left out."""
 
-import random
 from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
+from airground_drake.report.possible import heard_otherwise
 from airground_drake.scenario.rounding import SPARE_S
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
@@ -26,12 +27,6 @@ def loses(trace: Trace) -> bool:
 def acts_on_old(trace: Trace) -> bool:
     """Whether UGVs act on the last positions of each other that arrived, by the asynchronous law."""
     return trace.scenario.control.law == "asynchronous"
-
-
-def late_samples(trace: Trace) -> int:
-    """After how many control samples a position arrives there."""
-    links = trace.scenario.ugv_links
-    return int(np.ceil(links.delay_s / trace.scenario.control.period_s - 1e-9)) if links and acts_on_old(trace) else 0
 
 
 def towards_old(normal: Array, distance: Array, safe: Array, unsure: Array, period_s: float) -> tuple[Array, Array]:
@@ -95,29 +90,9 @@ def _reach(trace: Trace, ugv: str, other: str) -> float:
 
 
 def wrong_positions(trace: Trace) -> list[Fault]:
-    """Messages that arrive or are lost against the channel's draws, and positions that are not as announced."""
-    return [*_heard_otherwise(trace), *_announced_otherwise(trace)]
-
-
-def _heard_otherwise(trace: Trace) -> Iterator[Fault]:
-    links, channel, t = trace.scenario.ugv_links, trace.scenario.channel, trace.sampled("t_s")
-    if links is None or channel is None or not (links.loss or acts_on_old(trace)):
-        return
-    late, h = late_samples(trace), trace.scenario.control.period_s
-    n, last = len(trace.ugvs), np.zeros((len(trace.ugvs),) * 2)
-    for k, now in enumerate(t.tolist()):
-        lot = random.Random(f"{channel.seed}/ugvs/{k - late}")
-        draws = [[lot.random() for _ in range(n)] for _ in range(n)]
-        for i, ugv in enumerate(trace.ugvs):
-            for j, other in enumerate(trace.ugvs):
-                if i == j:
-                    continue
-                if k == late or (k > late and draws[i][j] >= links.loss):
-                    last[i, j] = now - late * h
-                recorded = trace.sampled(f"{ugv}.heard_{other}_s")[k]
-                if abs(recorded - last[i, j]) > TIME_TOLERANCE_S:
-                    yield Fault("heard otherwise", ugv, now, {"of": other, "due": last[i, j], "recorded": recorded})
-                    return
+    """Positions that arrive or are lost against the channel's draws, or are not as announced."""
+    heard = islice(heard_otherwise(trace, trace.scenario), 1)
+    return [*(Fault("heard otherwise", *found[:3]) for found in heard), *_announced_otherwise(trace)]
 
 
 def _announced_otherwise(trace: Trace) -> Iterator[Fault]:
