@@ -25,7 +25,7 @@ Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and 
 
 def impossible(trace: Trace, scenario: Scenario) -> Iterator[Line]:
     """A line for the first thing that cannot have been so."""
-    for of in (_referred, _spoken, _carried, heard_otherwise, _executed):
+    for of in (_referred, _spoken, _carried, _heard, _executed):
         for about, t_s, theirs, ours in of(trace, scenario):
             yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
             return
@@ -82,7 +82,9 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
             message, ugv = (row["kind"], row["number"], row["attempt"]), row["sender" if back else "receiver"]
             sent[message] = Message(*message[:2], row["about"], trace.ugvs.index(ugv), row["sent_s"], message[2])
             recorded[*message, row["copy"]] = row["received_s"]
-        carried = link.carry(Transit(), [*sent.values()], math.inf)
+        # of one instant, what is repeated leaves before what is new, and a withdrawal before a proposal
+        in_order = sorted(sent.values(), key=lambda m: (m.sent_s, m.attempt == 0, m.kind == "proposal"))
+        carried = link.carry(Transit(), in_order, math.inf)
         due = {(m.kind, m.number, m.attempt, 0): math.nan for m in carried.lost}
         for at_s, _, copy, m in carried.arrived:
             due[m.kind, m.number, m.attempt, copy] = at_s
@@ -99,7 +101,7 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
                 yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, told, due_s
 
 
-def heard_otherwise(trace: Trace, scenario: Scenario) -> Wrong:
+def _heard(trace: Trace, scenario: Scenario) -> Wrong:
     """The last positions of each other that UGVs have are those that their links delivered."""
     links, channel, late = scenario.ugv_links, scenario.channel, scenario.late_samples
     if channel is None or links is None or not (links.loss or scenario.asynchronous):
@@ -116,24 +118,22 @@ def heard_otherwise(trace: Trace, scenario: Scenario) -> Wrong:
 
 
 def _executed(trace: Trace, scenario: Scenario) -> Wrong:
-    """A UGV executes what has arrived, and under a gatekeeper exactly what that accepts, unless it is withdrawn."""
-    times, period_s = trace.sampled("t_s"), scenario.gatekeeper.period_s
+    """A UGV executes what has arrived, and under a gatekeeper what that accepts, until news about it arrive."""
     if scenario.ugv_controller is not None:
         return
-    began: dict[int, float] = {}
-    for kind, number, at_s in zip(*(trace.messages[c].tolist() for c in ("kind", "about", "received_s")), strict=True):
-        if kind == "proposal":
-            began[number] = min(at_s, began.get(number, math.inf))
-    withdrawn = trace.messages[trace.messages["kind"] == "withdrawal"].groupby("about")["received_s"].min().to_dict()
+    period_s, gated = scenario.gatekeeper.period_s, method_of(trace.meta["method"]).gated
+    table = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s")
+    listed = (trace.decisions[name].tolist() for name in ("robot", "t_s", "number", "decision"))
     said = {
         (ugv, round(t / period_s)): number if answer == "accept" else -1
-        for ugv, t, number, answer in zip(
-            *(trace.decisions[name].tolist() for name in ("robot", "t_s", "number", "decision")), strict=True
-        )
+        for ugv, t, number, answer in zip(*listed, strict=True)
     }
     for ugv in trace.ugvs:
-        for t, number in zip(times.tolist(), trace.sampled(f"{ugv}.executing").tolist(), strict=True):
-            due = said.get((ugv, int((t + SAME_S) / period_s)), -1) if method_of(trace.meta["method"]).gated else number
-            over = number == -1 and withdrawn.get(due, math.inf) <= t + SAME_S
-            if (number != due and not over) or (number >= 0 and began.get(number, math.inf) > t + SAME_S):
+        rows = table[table["receiver"] == ugv].sort_values("received_s")
+        arrived = [*zip(rows["received_s"].tolist(), rows["about"].tolist(), rows["kind"].tolist(), strict=True)]
+        for t, number in zip(trace.sampled("t_s").tolist(), trace.sampled(f"{ugv}.executing").tolist(), strict=True):
+            due = said.get((ugv, int((t + SAME_S) / period_s)), -1) if gated else number
+            news = {(about, kind) for at_s, about, kind in arrived if at_s <= t + SAME_S}
+            over = number == -1 and any(about > due or (about, kind) == (due, "withdrawal") for about, kind in news)
+            if (number != due and not over) or (number >= 0 and (number, "proposal") not in news):
                 yield f"number of the proposal that {ugv} executes", t, number, due

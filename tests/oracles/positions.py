@@ -1,13 +1,9 @@
-"""Positions between UGVs over links: which messages arrive, what is announced, who stands and who is left out."""
-
-from collections.abc import Iterator
-from itertools import islice
+"""Positions between UGVs over links: what is announced, who stands and who is left out."""
 
 import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.report.possible import heard_otherwise
 from airground_drake.scenario.rounding import SPARE_S
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
@@ -90,19 +86,15 @@ def _reach(trace: Trace, ugv: str, other: str) -> float:
 
 
 def wrong_positions(trace: Trace) -> list[Fault]:
-    """Positions that arrive or are lost against the channel's draws, or are not as announced."""
-    heard = islice(heard_otherwise(trace, trace.scenario), 1)
-    return [*(Fault("heard otherwise", *found[:3]) for found in heard), *_announced_otherwise(trace)]
-
-
-def _announced_otherwise(trace: Trace) -> Iterator[Fault]:
     """Without errors a UGV is announced a step of its command from where it was."""
     if not trace.scenario.announces or trace.scenario.sensing:
-        return
+        return []
+    found = list[Fault]()
     t = trace.sampled("t_s")
     for ugv in trace.ugvs:
         place: Array = trace.position(ugv)[trace.sample_rows]
         due = np.concatenate([place[:1], place[:-1] + trace.scenario.control.period_s * trace.chosen(ugv)[:-1]])
         off = np.linalg.norm(trace.as_seen(ugv, ugv) - due, axis=1)
         if (off > SAME_M).any():
-            yield Fault("announced otherwise", ugv, float(t[int(np.argmax(off > SAME_M))]), float(off.max()))
+            found.append(Fault("announced otherwise", ugv, float(t[int(np.argmax(off > SAME_M))]), float(off.max())))
+    return found

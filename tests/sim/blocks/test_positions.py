@@ -163,7 +163,7 @@ def test_a_ugv_that_drives_without_a_message_of_a_near_one_is_found() -> None:
     )
     unheard = forged(trace, f"{first}.heard_{second}_s", trace.sampled("t_s")[k - 1], k)
     assert broken_rules(unheard) == 2 * ["standing without a message"]
-    assert "positions" in faults_of(unheard)
+    assert "records" in faults_of(unheard)
 
 
 def test_what_is_lost_depends_on_seed_and_sample_alone_and_starts_are_known() -> None:
