@@ -16,10 +16,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from airground_drake.base import files
-from airground_drake.base.arrays import Array
 from airground_drake.base.registry import MODEL_CLAIMS
 from airground_drake.base.statuses import meets
 from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
@@ -27,10 +24,6 @@ from airground_drake.report.compare import WITHIN, differences
 from airground_drake.report.lines import Line, different, line_of, print_lines, short
 
 WITHIN_PX = 0.02  # coordinates in drawings agree to this: they are rounded to 0.01
-
-# Places (m) and velocities (m/s) that a scenario prescribes agree to this: thousands of roundings err by less.
-WITHIN_SCRIPT = 1e-9
-CORNER_S = 1e-9  # a velocity so near to a corner of its preset, s, may be that of either side
 
 _DRAWING = re.compile(r"(<svg\b.*?</svg>)", re.DOTALL)
 _TEXT = re.compile(r">\s*([^<>\s][^<>]*)<")
@@ -43,6 +36,7 @@ Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]  # from a scenario and its
 def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     """Make a report again and compare it: a line for each claim and each other part."""
     # judge: judges the claims; default: `judge_all`, without its cache.
+    from airground_drake.report.possible import impossible
     from airground_drake.scenario.load import from_data, own
     from airground_drake.sim import trace
     from airground_drake.verify import judge_all
@@ -50,9 +44,9 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
     traces = {name: with_events(trace.load(folder / "trace" / name, name)) for name in scenario.runs}
-    unscripted = [line for name, run in traces.items() for line in off_script(run, own(scenario, name))]
-    if unscripted:
-        yield from unscripted
+    wrong = [line for name, run in traces.items() for line in impossible(run, own(scenario, name))]
+    if wrong:
+        yield from wrong
         return  # what is judged on such a run is not about the scenario
     again = document_again(report, scenario, traces, judge or judge_all)
     other_code = _other_code(report["provenance"])
@@ -67,30 +61,6 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     except Exception as error:  # the parts that are taken as recorded may have any content
         why = f"{type(error).__name__}: {error}"
         yield line_of("report.html", "", OPEN, f"the pages cannot be made again: {short(why)}", "pages")
-
-
-def off_script(trace: Any, scenario: Any) -> Iterator[Line]:
-    """A line for each moving obstacle and preset trajectory that is not where the scenario of the run says."""
-    from airground_drake.model.geometry.motion import Motion
-    from airground_drake.model.plants.scripted import Scripted
-    from airground_drake.scenario.world import make_world
-
-    def compared(what: str, t_s: Array, theirs: Array, *allowed: Array) -> Iterator[Line]:
-        off = np.min([np.abs(theirs - ours).max(axis=1) for ours in allowed], axis=0) > WITHIN_SCRIPT
-        for k in np.flatnonzero(off)[:1]:
-            about = f"the {what} at t = {t_s[k]:.9g} s"
-            yield different("trace", trace.run, about, theirs[k].tolist(), allowed[0][k].tolist())
-
-    for body in make_world(scenario).bodies:
-        if isinstance(body.plant, Scripted):
-            place = body.plant.script.sample(trace.t)
-            yield from compared(f"place of {body.name}, m,", trace.t, trace.position(body.name), place)
-    t_s = trace.sampled("t_s")
-    for name, ugv in scenario.ugvs.items():
-        preset = Motion.at_speed(np.array(ugv.preset.waypoints_m), ugv.preset.speed_m_s)
-        yield from compared(f"preset of {name}, m,", t_s, trace.reference(name), preset.sample(t_s))
-        rates = (np.array([preset.at(t)[1] for t in t_s + by]) for by in (CORNER_S, -CORNER_S))
-        yield from compared(f"velocity of the preset of {name}, m/s,", t_s, trace.reference_rate(name), *rates)
 
 
 def with_events(trace: Any) -> Any:

@@ -88,7 +88,7 @@ THRESHOLDS = {"fixed": "set by hand", "printed": "by (19) as printed", "bayes": 
 OURS = ("robot", "under way")  # values of an encounter's `doing` that are the robots' own
 # What became of a proposal, by whether it was accepted and how it ended; each is in one class.
 CLASSES: Mapping[tuple[bool, str], str] = {
-    (False, "refused"): "refused", (False, "lost"): "lost", (True, "given up"): "dropped later",
+    (False, "refused"): "refused", (False, "lost"): "never arrived", (True, "given up"): "dropped later",
 }  # fmt: skip
 OPEN: Mapping[bool, str] = {True: "accepted", False: "unanswered"}  # the class of the others
 OBEYED: Mapping[str, str] = {"accepted": "obeyed", "unanswered": "not begun"}  # the classes of a method without answers

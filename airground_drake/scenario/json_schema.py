@@ -160,7 +160,7 @@ def wanted_at(whole: Schema, *at: str) -> str:
         "number": "a number{unit} from {minimum:g} to {maximum:g}",
         "integer": "a whole number from {minimum} to {maximum}",
         "boolean": "true or false",
-        "string": "a name of at most {maxLength} letters, digits and underscores that does not begin with a digit"
+        "string": "a name of at most {maxLength} of a-z, A-Z, 0-9 and _, no digit first"
         if says.get("pattern") == NAME_PATTERN
         else "text of at most {maxLength} characters (in quotes where it looks like a number)",
     }[kind].format(unit=unit, **{"maxLength": MAX_TEXT, **says})

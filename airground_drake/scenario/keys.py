@@ -5,8 +5,12 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from airground_drake.base.arrays import LARGEST
 from airground_drake.base.registry import PLUGIN
 from airground_drake.scenario.json_schema import Schema, kind_of
+
+NOTHING = {"type": "null"}
+MOST = {"exclusiveMaximum": "below", "maximum": "at most"}
 
 
 class Entry(NamedTuple):
@@ -41,7 +45,7 @@ def _sections(schema: Schema, part: Schema, path: str, kind: str = "") -> Iterat
     yield Section(path, part["description"], entries, kind)
     for key, says in keys:
         for where, below in (
-            ("", _ref(says)),
+            ("", _given(says)),
             (".NAME", says.get("additionalProperties") or {}),
             (".N", says.get("items") or {}),
         ):
@@ -55,10 +59,15 @@ def _sections(schema: Schema, part: Schema, path: str, kind: str = "") -> Iterat
 
 def _allowed(key: str, part: Schema) -> str:
     """What may stand under a key, and its default."""
-    says = part["properties"][key]
+    says = part["properties"][key] | _given(part["properties"][key])
     words = [_kind(says)]
     if says.get("type") == "number":
         words += ["0 or more"] if says["minimum"] == 0.0 else ["above 0"] if says["minimum"] > 0.0 else []
+        words += [
+            f"{most} {says[name]:g}"
+            for name, most in MOST.items()
+            if 0.0 <= says["minimum"] < says.get(name, LARGEST) < LARGEST
+        ]
     if says.get("type") == "integer":
         words.append(f"{says['minimum']} to {says['maximum']}")
     if "default" in says and says["default"] not in ({}, [], "", None):
@@ -68,13 +77,15 @@ def _allowed(key: str, part: Schema) -> str:
     return ", ".join(words)
 
 
-def _ref(says: Schema) -> Schema:
-    """The mapping that may stand under a key, also if nothing may stand there, too."""
-    return next((kind for kind in says.get("anyOf", ()) if kind.keys() & {"$ref", "oneOf"}), says)
+def _given(says: Schema) -> Schema:
+    """The mapping that may stand under a key, or what may stand there besides nothing."""
+    kinds = says.get("anyOf", ())
+    mapping = next((kind for kind in kinds if kind.keys() & {"$ref", "oneOf"}), says)
+    return next(kind for kind in kinds if kind != NOTHING) if mapping is says and NOTHING in kinds else mapping
 
 
 def _kind(says: dict[str, Any]) -> str:
-    says = _ref(says)
+    says = _given(says)
     if "anyOf" in says:
         return ", ".join([*(_kind(choice) for choice in says["anyOf"] if "enum" in choice), PLUGIN])
     if "enum" in says:

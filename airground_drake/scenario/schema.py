@@ -517,7 +517,7 @@ class WayBack:
     loss: Loss | None = None
     """Share of messages that are lost."""
     burst_s: NotNegative | None = None
-    """Mean duration of a loss; 0: each message is lost for itself."""
+    """Mean duration of a loss, 0.001 s at least; 0: each message is lost for itself."""
     duplicate: Chance | None = None
     """Share of messages that arrive twice."""
     reorder: YesNo | None = None
@@ -561,7 +561,7 @@ class Channel:
     loss: Loss = 0.0
     """Share of messages that are lost."""
     burst_s: NotNegative = 0.0
-    """Mean duration of a loss; 0: each message is lost for itself."""
+    """Mean duration of a loss, 0.001 s at least; 0: each message is lost for itself."""
     duplicate: Chance = 0.0
     """Share of messages that arrive twice."""
     reorder: YesNo = True
@@ -670,7 +670,7 @@ class Scenario:
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid", revalidate_instances="always")
 
     name: Name
-    """Its name: letters, digits and underscores."""
+    """Its name: a-z, A-Z, 0-9 and _."""
     title: Words = ""
     """One line."""
     description: Words = ""

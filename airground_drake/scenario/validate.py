@@ -32,6 +32,7 @@ from airground_drake.scenario.shapes import crossing, near_edge
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 TOLERANCE = 1e-9  # m between points; relative between periods
+SHORTEST_S = 1e-3  # of a spell in which a link loses everything: all of a run are drawn in advance
 _SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
 
 Problems = Iterator[tuple[str, object, str]]
@@ -83,6 +84,13 @@ def _charges(scenario: Scenario) -> Problems:
             lists = " or ".join(f"{scenario.key_of(name)}.ugvs" for name in scenario.aerial)
             allowed = f"wanted: in {lists}, or one UAV without a list, which gets the rest"
             yield f"ugvs.{ugv}", Fault("in no UAV's charge"), allowed
+
+
+def _bursts(scenario: Scenario) -> Problems:
+    """The spells of a link can be counted."""
+    for key, way in (("channel", scenario.channel), ("channel.up", scenario.channel and scenario.channel.up)):
+        if way is not None and 0.0 < (way.burst_s or 0.0) < SHORTEST_S:
+            yield f"{key}.burst_s", way.burst_s, f"0: each message is lost for itself; or at least {SHORTEST_S:g} s"
 
 
 def _ugv_links(scenario: Scenario) -> Problems:
@@ -674,7 +682,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _uavs, _names, _reserved, _charges, _ugv_links, _shapes, _map, _blocks, _route, _runs, _plants,
+    _uavs, _names, _reserved, _charges, _bursts, _ugv_links, _shapes, _map, _blocks, _route, _runs, _plants,
     _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _standing, _faults,
     _measured, _budget, _asynchronous, _reproduction, _choices,
 )  # fmt: skip

@@ -18,11 +18,11 @@ from airground_drake.model.trigger.automaton import Trigger
 from airground_drake.model.trigger.bayes import COMPUTED
 from airground_drake.scenario.budget import budget, takes_room
 from airground_drake.scenario.courses import course
+from airground_drake.scenario.links import make_qualities
 from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
-from airground_drake.scenario.schema import Channel, Decision, Scenario, Uav, WayBack
+from airground_drake.scenario.schema import Decision, Scenario, Uav
 from airground_drake.scenario.world import make_world
-from airground_drake.uav.channel import Link, Quality
 from airground_drake.uav.database import BehaviourDatabase, make_policy
 from airground_drake.uav.planner import Mover, Planner, Sender
 from airground_drake.ugv.answer import Rules
@@ -49,20 +49,6 @@ def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -
 def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:
     control, avoidance = scenario.control, make_avoidance(scenario, composition)
     return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
-
-
-def make_qualities(channel: Channel) -> tuple[Quality, Quality]:
-    """The ways from the UAV to UGVs, and back."""
-    there = {name: getattr(channel, name) for name in Quality._fields}
-    up = channel.up or WayBack()
-    back = {name: value for name in Quality._fields if (value := getattr(up, name)) is not None}
-    return Quality(**there), Quality(**{**there, **back})
-
-
-def make_links(channel: Channel) -> tuple[Link, Link]:
-    """The links from the UAV to UGVs, and back."""
-    down, up = make_qualities(channel)
-    return Link(down, channel.seed, "down"), Link(up, channel.seed, "up")
 
 
 def lost_at(scenario: Scenario) -> list[float]:

@@ -21,6 +21,7 @@ from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import COMPOSITIONS, Composition
 from airground_drake.model.law.task import Task
+from airground_drake.scenario.links import make_links
 from airground_drake.scenario.load import validated
 from airground_drake.scenario.schema import Faults, Scenario
 from airground_drake.scenario.world import make_world
@@ -175,7 +176,7 @@ def build_model(
     }
     links = None
     if channel:
-        down, up = components.make_links(channel)
+        down, up = make_links(channel)
         start, sent = next(iter(plans.values())).start(), _named("sent", plans).values()
         links = Downlink(down, sent, start, period, retry, components.lost_at(scenario)), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}

@@ -298,6 +298,6 @@ def simulate(
                 watch(valid.duration_s)
             return trace
         except LeftToDrakeError as error:
-            print(f"note: Drake's Simulator makes run {run}: the loop leaves it {error}", file=sys.stderr)
+            print(f"note: Drake's Simulator makes run {run}, not the compiled loop: it has {error}", file=sys.stderr)
     recorder = Recorder(valid, run, decision_block, observers, plants=plants, ugv_controller=ugv_controller)
     return recorder.simulate(watch=watch, speed=speed)

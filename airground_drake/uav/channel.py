@@ -12,6 +12,9 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
+from airground_drake.base.arrays import Flags
 from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.motion import SAME_S
 
@@ -134,3 +137,11 @@ def _changes(link: str, loss: float, burst_s: float, until: float) -> tuple[bool
         changes.append(t)
         bad = not bad
     return begins_bad, tuple(changes)
+
+
+@lru_cache(maxsize=4)
+def lost(seed: int, loss: float, count: int, sample: int) -> Flags:
+    """Which positions between UGVs are lost at a control sample, (count, count), by receiver and sender."""
+    lot = random.Random(f"{seed}/ugvs/{sample}")
+    drawn = np.array([lot.random() for _ in range(count * count)]).reshape(count, count)
+    return np.asarray((drawn < loss) & ~np.eye(count, dtype=np.bool_) & (sample > 0))  # starts are known

@@ -246,7 +246,7 @@ FORGERIES: dict[str, tuple[str, Edit]] = {
     "collision left out": ("i, ii, iii", RULES["collision left out"][1]),
     "column of real positions": ("iii", made_again(rows(lambda frame: frame.assign(true_x_m=0.0)))),
     # messages, decisions, faults
-    "refusal forgotten": ("iii", made_again(refusal_forgotten)),
+    "refusal forgotten": ("ii, iii", made_again(refusal_forgotten)),
     "bound lowered": ("iii", made_again(bound_lowered)),
     "another motion of a refused proposal": ("iii", made_again(other_motion)),
     "faults left out": ("iii", made_again(fault_left_out)),

@@ -12,7 +12,7 @@ import pytest
 from builders import logs
 from builders.edits import moved, with_meta, with_scenario
 from check.forgeries import all_of, cells, claim, everywhere, rows
-from check.forging import Edit, edited_report, edited_table, forged, mend, refusals
+from check.forging import Edit, edited_report, edited_table, mend, refusals
 from hypothesis import given
 from hypothesis import strategies as st
 from persons import FORK, lone, walking
@@ -20,10 +20,9 @@ from sharing import once
 
 from airground_drake.base import files
 from airground_drake.base.errors import LogError
-from airground_drake.check.line import DISAGREES
 from airground_drake.check.rules import SMALL
 from airground_drake.check.scenario import Pair, pairs_of, way_m
-from airground_drake.report import document, rebuild
+from airground_drake.report import document
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.load import resolved
 from airground_drake.scenario.schema import Moves
@@ -193,39 +192,6 @@ FORGERIES: dict[str, tuple[str, set[str], Edit]] = {
 def test_forged_ways_speeds_and_lifetimes_are_refused(report_of: Callable[[str], Path], name: str) -> None:
     run, due, edit = FORGERIES[name]
     assert due <= {*refusals(report_of(run), edit)}
-
-
-def of_sample(column: str, by: float) -> Edit:
-    """Add to a cell of the samples in the middle of the run."""
-
-    def edit(folder: Path) -> None:
-        with edited_table(folder, "samples", "a") as samples:
-            samples.loc[len(samples) // 2, column] += by
-
-    return edit
-
-
-OFF_SCRIPT: dict[str, Edit] = {
-    **{name: edit for name, (_, due, edit) in FORGERIES.items() if due == {WAY} and name != "not recorded"},
-    "another place of the preset": of_sample("ugv1.ref_y_m", 2e-9),
-    "another velocity of the preset": of_sample("ugv1.ref_vx_m_s", 2e-9),
-    "another preset": everywhere("ugvs", "ugv1", "preset", "speed_m_s", value=0.9),
-}
-"""Movers and presets that do not follow the scenario, in the run "on the goal"."""
-
-
-@pytest.mark.parametrize("name", OFF_SCRIPT)
-def test_a_report_is_not_made_again_from_a_run_that_leaves_its_script(
-    report_of: Callable[[str], Path], name: str
-) -> None:
-    found = [*rebuild.lines(forged(report_of("on the goal"), OFF_SCRIPT[name]), judge=lambda *_: pytest.fail("judged"))]
-    assert {(line["claim"], line["run"], line["outcome"]) for line in found} == {("trace", "a", DISAGREES)}
-
-
-@pytest.mark.parametrize("name", ["crowd", "leaving", "fork"])
-def test_recorded_movers_and_presets_follow_the_scenario(name: str) -> None:
-    trace = RUNS[name]()
-    assert [*rebuild.off_script(trace, trace.scenario)] == []
 
 
 @given(

@@ -90,6 +90,7 @@ def test_list_has_every_key_that_scenarios_have(airground: Airground) -> None:
         assert found - listed == set()
     assert len(listed) > 100
     assert airground("list", "keys", "control").count("control.period_s (") == 1
+    assert "channel.up.loss (a number, 0 or more, below 1): " in airground("list", "keys", "channel.up")
     assert "ugvs.NAME.max_speed_m_s (" in airground("list", "keys", "max_speed_m_s")
     assert "unknown key 'nothing'" in airground("list", "keys", "nothing", code=2)
 

@@ -6,6 +6,7 @@ have one. So they are tests, and run on shipped and on drawn scenarios.
 
 from collections.abc import Callable
 
+from airground_drake.report.possible import impossible
 from airground_drake.sim.trace import Trace
 from oracles.channel import wrong_carriage
 from oracles.commands import wrong_commands
@@ -26,6 +27,7 @@ ORACLES: dict[str, Callable[[Trace], list[Fault]]] = {
     "protocol": wrong_executions,
     "channel": wrong_carriage,
     "positions": wrong_positions,
+    "records": lambda trace: [Fault(line["about"]) for line in impossible(trace, trace.scenario)],
     "inputs": wrong_inputs,
     "decisions": wrong_decisions,
 }

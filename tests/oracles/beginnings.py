@@ -18,7 +18,7 @@ from airground_drake.verify.runs.pairs import Pair, cores_of, pairs_beside, pair
 from airground_drake.verify.runs.proposals import ProposalRecord, proposal_of
 from oracles.closed_loops import Scene
 from oracles.control_law import place, selected
-from oracles.positions import acts_on_old, late_samples
+from oracles.positions import acts_on_old
 from oracles.protocol import parts_of
 from oracles.sensing import moves, place_of, still_parts
 from oracles.turning import numbers_of
@@ -180,7 +180,7 @@ def _other(
     coasting = here + np.minimum(after, trace.scenario.gatekeeper.horizon_s)[:, None] * velocity
     asked, share = told.get(other), pair.share
     if acts_on_old(trace) and other in trace.ugvs:
-        since = (late_samples(trace) + 1) * trace.scenario.control.period_s
+        since = (trace.scenario.late_samples + 1) * trace.scenario.control.period_s
         share = -trace.scenario.ugvs[other].max_speed_m_s * since
     if asked is None:
         return (coasting, coasting), pair.law_m, share, -np.inf

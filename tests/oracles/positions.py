@@ -1,7 +1,4 @@
-"""Positions between UGVs over links: which messages arrive, what is announced, who stands and who is left out."""
-
-import random
-from collections.abc import Iterator
+"""Positions between UGVs over links: what is announced, who stands and who is left out."""
 
 import numpy as np
 import numpy.typing as npt
@@ -26,12 +23,6 @@ def loses(trace: Trace) -> bool:
 def acts_on_old(trace: Trace) -> bool:
     """Whether UGVs act on the last positions of each other that arrived, by the asynchronous law."""
     return trace.scenario.control.law == "asynchronous"
-
-
-def late_samples(trace: Trace) -> int:
-    """After how many control samples a position arrives there."""
-    links = trace.scenario.ugv_links
-    return int(np.ceil(links.delay_s / trace.scenario.control.period_s - 1e-9)) if links and acts_on_old(trace) else 0
 
 
 def towards_old(normal: Array, distance: Array, safe: Array, unsure: Array, period_s: float) -> tuple[Array, Array]:
@@ -95,39 +86,15 @@ def _reach(trace: Trace, ugv: str, other: str) -> float:
 
 
 def wrong_positions(trace: Trace) -> list[Fault]:
-    """Messages that arrive or are lost against the channel's draws, and positions that are not as announced."""
-    return [*_heard_otherwise(trace), *_announced_otherwise(trace)]
-
-
-def _heard_otherwise(trace: Trace) -> Iterator[Fault]:
-    links, channel, t = trace.scenario.ugv_links, trace.scenario.channel, trace.sampled("t_s")
-    if links is None or channel is None or not (links.loss or acts_on_old(trace)):
-        return
-    late, h = late_samples(trace), trace.scenario.control.period_s
-    n, last = len(trace.ugvs), np.zeros((len(trace.ugvs),) * 2)
-    for k, now in enumerate(t.tolist()):
-        lot = random.Random(f"{channel.seed}/ugvs/{k - late}")
-        draws = [[lot.random() for _ in range(n)] for _ in range(n)]
-        for i, ugv in enumerate(trace.ugvs):
-            for j, other in enumerate(trace.ugvs):
-                if i == j:
-                    continue
-                if k == late or (k > late and draws[i][j] >= links.loss):
-                    last[i, j] = now - late * h
-                recorded = trace.sampled(f"{ugv}.heard_{other}_s")[k]
-                if abs(recorded - last[i, j]) > TIME_TOLERANCE_S:
-                    yield Fault("heard otherwise", ugv, now, {"of": other, "due": last[i, j], "recorded": recorded})
-                    return
-
-
-def _announced_otherwise(trace: Trace) -> Iterator[Fault]:
     """Without errors a UGV is announced a step of its command from where it was."""
     if not trace.scenario.announces or trace.scenario.sensing:
-        return
+        return []
+    found = list[Fault]()
     t = trace.sampled("t_s")
     for ugv in trace.ugvs:
         place: Array = trace.position(ugv)[trace.sample_rows]
         due = np.concatenate([place[:1], place[:-1] + trace.scenario.control.period_s * trace.chosen(ugv)[:-1]])
         off = np.linalg.norm(trace.as_seen(ugv, ugv) - due, axis=1)
         if (off > SAME_M).any():
-            yield Fault("announced otherwise", ugv, float(t[int(np.argmax(off > SAME_M))]), float(off.max()))
+            found.append(Fault("announced otherwise", ugv, float(t[int(np.argmax(off > SAME_M))]), float(off.max())))
+    return found

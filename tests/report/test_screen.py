@@ -232,7 +232,7 @@ def test_arrived(edits: list[Edit], mark: str, lines: list[str]) -> None:
          ["called 1 time, sent none"]),
         ("d", [fault], ["never called", "policy failed 1 time"]),
         ("d", [sent((1.0, "over"), (1.0, "given up"), (None, "refused"), (None, "withdrawn first"), (None, "lost"))],
-         ["5 sent: 1 accepted, 1 dropped later, 1 lost, 1 refused, 1 unanswered",
+         ["5 sent: 1 accepted, 1 dropped later, 1 never arrived, 1 refused, 1 unanswered",
           "why refused: waiting looked cheaper"]),
         ("b", [sent((1.0, "released"), (None, "withdrawn first"))], ["2 sent: 1 not begun, 1 obeyed"]),
         ("d", [metric("messages", {"proposals": 1, "withdrawals": 1, "answers": 3, "always_on": {"proposals": 40}})],

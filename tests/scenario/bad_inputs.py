@@ -95,6 +95,7 @@ EDITS: list[tuple[str, object]] = [
     ("channel.delay_s", -0.1),
     ("channel.los", 0.1),
     ("channel.up", {"delay": 1}),
+    ("channel.up", {"burst_s": 1e-9}),
     # runs, reproduction, choices
     ("runs.d.stalls_m.three", [1, 0, 0]),
     ("runs.d.expected.SAFE", "holds"),

@@ -247,7 +247,7 @@ class Going:
             elif code == loop.PYTHON:
                 self._update()
             else:
-                raise LeftToDrakeError("a run that ends in an error")
+                raise LeftToDrakeError("an error at its end")
 
     def plan_ahead(self) -> None:
         """Plan for this instant, before its updates, which then take this result; the last one counts."""

@@ -7,7 +7,6 @@ out of its law. Under the asynchronous law it publishes where it is, and others 
 
 import random
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,18 +21,11 @@ from airground_drake.scenario.schema import Faults, Scenario
 from airground_drake.sim.blocks.controllers import UgvController, asked_at
 from airground_drake.sim.blocks.lifetime import weakly
 from airground_drake.sim.blocks.signals import declare_bodies
+from airground_drake.uav.channel import lost
 from airground_drake.uav.policy import Proposal
 
 # fields of `Neighbours` with a row per robot
 OF_ROBOTS = ("members", "others", "distance", "share", "mobility", "max_speed")
-
-
-@lru_cache(maxsize=4)
-def lost(seed: int, loss: float, count: int, sample: int) -> Flags:
-    """Which messages of a control sample are lost, (count, count), by receiver and sender: nothing else counts."""
-    lot = random.Random(f"{seed}/ugvs/{sample}")
-    drawn = np.array([lot.random() for _ in range(count * count)]).reshape(count, count)
-    return np.asarray((drawn < loss) & ~np.eye(count, dtype=np.bool_) & (sample > 0))  # starts are known
 
 
 class Announcements(LeafSystem):

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Iterator, Mapping
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -230,14 +231,14 @@ def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.obje
 
 
 def _dated(table: text.Table, time: Time) -> Time:
-    """The time, and where it is written as a date, the cells as nanoseconds since 1970."""
+    """The time, and where it is written as a date, the cells as seconds since 1970."""
     cells = table.cells[time.whole]
     if not _ISO.fullmatch(next(filter(None, cells), "")):
         return time
-    dates = pd.to_datetime(cells, utc=True, errors="coerce", format="ISO8601")
-    stamps = dates.dt.as_unit("ns").astype("int64").astype(str)
+    dates = pd.to_datetime(cells.str.replace(",", "."), utc=True, errors="coerce", format="ISO8601")
+    stamps = dates.dt.as_unit("ns").astype("int64").map(lambda ns: str(Decimal(ns).scaleb(-9)))
     table.cells[time.whole] = stamps.where(dates.notna(), "")
-    return time._replace(unit="ns")
+    return time._replace(unit="s")
 
 
 def _stamps(table: text.Table, time: Time) -> tuple[Whole, Whole, Flags]:

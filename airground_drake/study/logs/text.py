@@ -108,7 +108,7 @@ def _form(lines: Sequence[str]) -> tuple[str, int]:
                 raise LogError(f"it has {count} columns; allowed: {MOST}")
             return delimiter, count
     raise LogError(
-        "it is not a table: its lines have no common number of fields, by semicolons, tabs, commas or blanks"
+        "it is not a table: its lines have no common number of fields, by semicolons, tabs, commas, bars or blanks"
     )
 
 

@@ -30,8 +30,7 @@ class LiveGate(LiveWait):
     assumptions = (
         "No obstacle is sensed that the UGV did not know at its acceptance. Obstacles in range stand still: an "
         "intervention beside one that may move is not counted.",
-        "The UAV does not withdraw the proposal. It withdraws all parts of a joint plan when one UGV refuses its part; "
-        "a part is executed only while the others are accepted or done.",
+        "The UAV does not withdraw the proposal. It withdraws all parts of a joint plan when one UGV refuses its part.",
         "The gatekeeper is sampled every period. Rounding of times is not counted.",
     )
     does_not_establish = (

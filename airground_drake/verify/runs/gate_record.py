@@ -18,7 +18,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.proposals import GATED_METHODS, silent, talk_is_due, without_proposals
+from airground_drake.verify.runs.proposals import GATED_METHODS, silent, talk_is_due, unreached, without_proposals
 
 # Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m.
 POSITION_TOLERANCE_M = 1e-9
@@ -230,7 +230,8 @@ def conclude(finding: Finding, compared: Iterable[Deviation]) -> Finding:
 def without_decisions(trace: Trace) -> list[str]:
     """UGVs that never decided, though they executed something, or got a proposal and were intervened on long enough."""
     # This is no refutation: their proposals may have been withdrawn at once.
-    asked = [ugv for ugv in trace.ugvs if talk_is_due(trace, ugv) and ugv not in without_proposals(trace)]
+    left_out = {*without_proposals(trace), *unreached(trace)}
+    asked = [ugv for ugv in trace.ugvs if talk_is_due(trace, ugv) and ugv not in left_out]
     called = [ugv for ugv in trace.ugvs if (trace.executing(ugv) >= 0).any() or ugv in asked]
     return [ugv for ugv in called if not (trace.decisions["robot"] == ugv).any()]
 
@@ -253,7 +254,7 @@ class GateClaim(TraceClaim):
             return silent(trace, without, "decision")
         rows = trace.derived("rows", lambda: rows_of(trace))
         if not rows:
-            reason = "nothing was proposed to a UGV for long enough: nothing to decide"
+            reason = "no UGV had a proposal for long enough: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)
         finding = self.judge_rows(trace, rows)
         return replace(finding, evidence={**finding.evidence, "without_decisions": without})

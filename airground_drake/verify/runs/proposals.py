@@ -155,6 +155,15 @@ def without_proposals(trace: Trace) -> list[str]:
     return [ugv for ugv in trace.ugvs if ugv in asked - got]
 
 
+def unreached(trace: Trace) -> set[str]:
+    """UGVs none of whose proposals arrived in time for a decision."""
+    sent, last_s = (
+        trace.messages[trace.messages["kind"] == "proposal"],
+        trace.t[-1] - trace.scenario.gatekeeper.period_s,
+    )
+    return {*sent["receiver"]} - {*sent.loc[sent["received_s"] <= last_s, "receiver"]}
+
+
 def lost_at_the_end(trace: Trace) -> list[str]:
     """UGVs that are still intervened on at the end, and for which the UAV found no way when it last looked for one."""
     return [ugv for ugv in trace.ugvs if _is_lost(trace, ugv)]

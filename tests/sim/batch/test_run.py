@@ -125,10 +125,7 @@ def test_a_step_over_corners_misses_nothing(
 def test_what_is_left_to_drake(capsys: pytest.CaptureFixture[str]) -> None:
     scenario = load("minimal", ["duration_s=1.0"])
     assert first_difference(*(simulate(scenario, "a", engine="batch", speed=speed) for speed in (0.0, 1e3))) is None
-    said = (
-        "note: Drake's Simulator makes run a: the loop leaves it a decision block of your own, observers or a speed\n"
-    )
-    assert capsys.readouterr().err == said
+    assert capsys.readouterr().err.endswith("it has a decision block of your own, observers or a speed\n")
     with pytest.raises(LeftToDrakeError, match="by the clock"):
         Batch(load("case_a", ["gatekeeper.budget=wall_clock"]), "c")
 

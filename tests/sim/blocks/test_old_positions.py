@@ -106,7 +106,7 @@ def test_a_position_that_is_older_than_it_was_is_found() -> None:
         old = replace(
             trace, samples=trace.samples.assign(**{f"{first}.heard_{second}_s": np.maximum(heard - 1.0, 0.0)})
         )
-        assert ORACLES["positions"](old)
+        assert ORACLES["records"](old)
         ours, theirs = found(old, "SAFE-HYP")["SAFE-HYP"], safety.safe_hyp(checked(old)).status
         assert ours == theirs
         judged += ours == "refuted"

@@ -16,10 +16,11 @@ from airground_drake.check import safety
 from airground_drake.model.plants.budget import Bounds, law_distance, part_of_gain
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import Scenario
-from airground_drake.sim.blocks.positions import WaryUgvController, lost
+from airground_drake.sim.blocks.positions import WaryUgvController
 from airground_drake.sim.diagram import make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
+from airground_drake.uav.channel import lost
 from airground_drake.verify import judge
 
 PERIOD_S, APART_M = 0.05, 0.6
@@ -161,7 +162,7 @@ def test_a_ugv_that_drives_without_a_message_of_a_near_one_is_found() -> None:
     )
     unheard = forged(trace, f"{first}.heard_{second}_s", trace.sampled("t_s")[k - 1], k)
     assert broken_rules(unheard) == 2 * ["standing without a message"]
-    assert ORACLES["positions"](unheard)
+    assert ORACLES["records"](unheard)
 
 
 def test_what_is_lost_depends_on_seed_and_sample_alone_and_starts_are_known() -> None:

@@ -2,6 +2,7 @@
 
 import sqlite3
 from collections.abc import Callable, Iterable, Mapping
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -327,6 +328,11 @@ def per_file(bodies: Motion, name: str) -> Callable[[Path], Path]:
     return write
 
 
+def logged(t_s: float) -> str:
+    """As Python's `logging` writes it."""
+    return f"{datetime.fromtimestamp(EPOCH_NS // 10**9 + t_s, UTC):%Y-%m-%d %H:%M:%S,%f}"
+
+
 def lab(bodies: Motion, head: str, stamp: Callable[[float], str] = "{:.6f}".format) -> Callable[[], list[list[str]]]:
     return lambda: logs.long(bodies, head, stamp)
 
@@ -373,6 +379,7 @@ FORMS = {
         table("log.csv", lab(JITTER, "stamp,robot,x,y,z", lambda t: str(EPOCH_NS + round(t * 1e9)))), JITTER,
         (UNDER_1970,),
     ),
+    "dates, comma": Form(table("log.csv", lab(FULL, "time,name,x,y,z", logged), ";"), FULL, within_m=1e-5),
     "echo": Form(echo, FULL, (UNDER_1970,)),
     "plotted": Form(plotted, SLOW),
     "ms": Form(

@@ -1,0 +1,139 @@
+"""What a run of a scenario cannot have had: messages, positions heard, executions and references.
+
+The fate of a message follows from the scenario alone, so no run is simulated for this.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from airground_drake.base.registry import method_of
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.report.lines import Line, different
+from airground_drake.scenario.links import make_links
+from airground_drake.scenario.schema import Channel, Scenario
+from airground_drake.sim.trace import Trace
+from airground_drake.uav.channel import Message, Transit, lost
+from airground_drake.verify.claim import TIME_TOLERANCE_S as SAME_S
+
+CORNER_S = 1e-9  # a velocity so near to a corner of its preset, s, may be that of either side
+SAME_M_S = 1e-9
+Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and as it is due
+
+
+def impossible(trace: Trace, scenario: Scenario) -> Iterator[Line]:
+    """A line for the first thing that cannot have been so."""
+    for of in (_referred, _spoken, _carried, _heard, _executed):
+        for about, t_s, theirs, ours in of(trace, scenario):
+            yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
+            return
+
+
+def _referred(trace: Trace, scenario: Scenario) -> Wrong:
+    """Velocities of the preset trajectories; the checker compares their places."""
+    t_s = trace.sampled("t_s")
+    for name, ugv in scenario.ugvs.items():
+        theirs = trace.reference_rate(name)
+        preset = Motion.at_speed(np.array(ugv.preset.waypoints_m), ugv.preset.speed_m_s)
+        both = [np.array([preset.at(t)[1] for t in t_s + by]) for by in (CORNER_S, -CORNER_S)]
+        off = np.min([np.abs(theirs - ours).max(axis=1) for ours in both], axis=0) > SAME_M_S
+        for k in np.flatnonzero(off)[:1]:
+            yield f"velocity of the preset of {name}, m/s,", t_s[k], theirs[k].tolist(), both[0][k].tolist()
+
+
+def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
+    """Messages are between a UAV and a UGV in its charge, not of a UAV that is lost, and read after they arrive."""
+    first = dict[tuple[str, int], tuple[Any, ...]]()
+    for row in trace.messages.to_dict("records"):
+        uav, ugv = (row["receiver"], row["sender"]) if row["kind"] == "answer" else (row["sender"], row["receiver"])
+        of_uav, t_s, number = scenario.aerial.get(uav), row["sent_s"], int(row["number"])
+        if of_uav is None or ugv not in scenario.in_charge(uav) or not 0.0 <= t_s <= trace.t[-1]:
+            said = f"{row['sender']} to {row['receiver']}, at {t_s:.9g} s"
+            yield f"who sends {row['kind']} {number}", 0.0, said, "a UAV and one of its UGVs, in the run"
+            continue
+        by_uav, until_s = row["read_s"] if row["kind"] == "answer" else t_s, of_uav.lost_at_s or math.inf
+        if by_uav >= until_s - SAME_S:
+            yield f"what {uav} sends or hears of {row['kind']} {number}", t_s, by_uav, f"before {until_s} s"
+        if not (row["read_s"] >= row["received_s"] - SAME_S or math.isnan(row["read_s"])):
+            yield f"reading of {row['kind']} {number}", t_s, row["read_s"], f"after {row['received_s']} s"
+        if not row["attempt"]:
+            first[row["kind"], number] = ugv, uav, t_s, row["about"]
+    listed = (trace.proposals[name].tolist() for name in ("number", "robot", "sender", "issued_s", "number"))
+    due = {("proposal", number): tuple(of_proposal) for number, *of_proposal in zip(*listed, strict=True)}
+    charge = {ugv: uav for uav in scenario.aerial for ugv in scenario.in_charge(uav)}
+    listed = (trace.decisions[name].tolist() for name in ("answer", "robot", "t_s", "number"))
+    due |= {("answer", k): (ugv, charge.get(ugv), *said) for k, ugv, *said in zip(*listed, strict=True) if k >= 0}
+    answers = [key for key in first if key[0] == "answer" and scenario.channel is None]
+    for key in dict.fromkeys([*due, *answers]):
+        theirs, ours = first.get(key), due.get(key)
+        if theirs != ours:
+            yield f"sending of {key[0]} {key[1]}", float((theirs or ours or (0.0,) * 3)[2]), theirs, ours
+
+
+def _carried(trace: Trace, scenario: Scenario) -> Wrong:
+    """Each message arrives when its link delivers it, and as often; what would arrive at the very end may not."""
+    table, ends = trace.messages, float(trace.sampled("t_s")[-1])
+    for back, link in enumerate(make_links(scenario.channel or Channel())):
+        rows = table[(table["kind"] == "answer") == bool(back)].to_dict("records")
+        sent, recorded = dict[tuple[Any, ...], Message](), dict[tuple[Any, ...], float]()
+        for row in rows:
+            message, ugv = (row["kind"], row["number"], row["attempt"]), row["sender" if back else "receiver"]
+            sent[message] = Message(*message[:2], row["about"], trace.ugvs.index(ugv), row["sent_s"], message[2])
+            recorded[*message, row["copy"]] = row["received_s"]
+        # of one instant, what is repeated leaves before what is new, and a withdrawal before a proposal
+        in_order = sorted(sent.values(), key=lambda m: (m.sent_s, m.attempt == 0, m.kind == "proposal"))
+        carried = link.carry(Transit(), in_order, math.inf)
+        due = {(m.kind, m.number, m.attempt, 0): math.nan for m in carried.lost}
+        for at_s, _, copy, m in carried.arrived:
+            due[m.kind, m.number, m.attempt, copy] = at_s
+        if len(rows) != len(recorded):
+            yield "rows of messages", 0.0, len(rows), len(recorded)
+        for kind, number, attempt in sent:
+            before = (kind, number, attempt - 1) if attempt else (kind, number - (kind != "proposal"), 0)
+            if -1 not in before and before not in sent:
+                yield f"what was sent before {kind} {number} (attempt {attempt})", 0.0, "nothing", list(before)
+        for key in {**recorded, **due}:
+            theirs, ours = recorded.get(key, math.nan), due.get(key, math.nan)
+            if not (abs(ours - theirs) <= SAME_S or (math.isnan(theirs) and not ours <= ends)):
+                told, due_s = ("never" if math.isnan(at) else at for at in (theirs, ours))
+                yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, told, due_s
+
+
+def _heard(trace: Trace, scenario: Scenario) -> Wrong:
+    """The last positions of each other that UGVs have are those that their links delivered."""
+    links, channel, late = scenario.ugv_links, scenario.channel, scenario.late_samples
+    if channel is None or links is None or not (links.loss or scenario.asynchronous):
+        return
+    n, h = len(trace.ugvs), scenario.control.period_s
+    last = np.zeros((n, n))
+    for k, t in enumerate(trace.sampled("t_s").tolist()):
+        if k >= late:
+            last[~lost(channel.seed, links.loss, n, k - late)] = t - late * h
+        for i, j in zip(*np.nonzero(~np.eye(n, dtype=np.bool_)), strict=True):
+            heard_s = trace.sampled(f"{trace.ugvs[i]}.heard_{trace.ugvs[j]}_s")[k]
+            if abs(heard_s - last[i, j]) > SAME_S:
+                yield f"last position of {trace.ugvs[j]} that {trace.ugvs[i]} has", t, float(heard_s), float(last[i, j])
+
+
+def _executed(trace: Trace, scenario: Scenario) -> Wrong:
+    """A UGV executes what has arrived, and under a gatekeeper what that accepts, until news about it arrive."""
+    if scenario.ugv_controller is not None:
+        return
+    period_s, gated = scenario.gatekeeper.period_s, method_of(trace.meta["method"]).gated
+    table = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s")
+    listed = (trace.decisions[name].tolist() for name in ("robot", "t_s", "number", "decision"))
+    said = {
+        (ugv, round(t / period_s)): number if answer == "accept" else -1
+        for ugv, t, number, answer in zip(*listed, strict=True)
+    }
+    for ugv in trace.ugvs:
+        rows = table[table["receiver"] == ugv].sort_values("received_s")
+        arrived = [*zip(rows["received_s"].tolist(), rows["about"].tolist(), rows["kind"].tolist(), strict=True)]
+        for t, number in zip(trace.sampled("t_s").tolist(), trace.sampled(f"{ugv}.executing").tolist(), strict=True):
+            due = said.get((ugv, int((t + SAME_S) / period_s)), -1) if gated else number
+            news = {(about, kind) for at_s, about, kind in arrived if at_s <= t + SAME_S}
+            over = number == -1 and any(about > due or (about, kind) == (due, "withdrawal") for about, kind in news)
+            if (number != due and not over) or (number >= 0 and (number, "proposal") not in news):
+                yield f"number of the proposal that {ugv} executes", t, number, due

@@ -1,0 +1,122 @@
+"""Messages, positions heard, executions and references that a run cannot have had; an honest run has none."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from sim.blocks.test_positions import team
+
+from airground_drake.report.possible import impossible
+from airground_drake.scenario.load import load
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
+
+CHANNEL = {
+    "delay_s": 0.2, "jitter_s": 0.1, "loss": 0.3, "burst_s": 0.3, "duplicate": 0.3, "up": {"loss": 0.5},
+    "ugvs": {"delay_s": 0.05, "loss": 0.2},
+}  # fmt: skip
+SENSING = {"position_error_m": 0.01, "uav_error_m": 0.02}
+
+
+@cache
+def run(method: str = "d") -> Trace:
+    return simulate(
+        team(1, None, channel=CHANNEL, sensing=SENSING, runs={name: {"method": name} for name in "bd"}), method
+    )
+
+
+def column(table: str, name: Any, value: Callable[[Any], Any], rows: Callable[[Any], Any] | None = None) -> Any:
+    def edit(trace: Trace) -> Trace:
+        frame = getattr(trace, table).copy()
+        at = np.ones(len(frame), dtype=bool) if rows is None else rows(frame)
+        assert np.any(at)
+        frame.loc[at, name] = value(frame.loc[at])
+        return replace(trace, **{table: frame})
+
+    return edit
+
+
+def first(**cells: Any) -> Callable[[pd.DataFrame], Any]:
+    """The first row with these cells."""
+
+    def rows(frame: pd.DataFrame) -> Any:
+        found = np.logical_and.reduce([frame[name] == value for name, value in cells.items()])
+        return np.arange(len(frame)) == int(np.argmax(found))
+
+    return rows
+
+
+def only(table: str, keep: Callable[[pd.DataFrame], Any]) -> Any:
+    return lambda trace: replace(trace, **{table: keep(getattr(trace, table))})
+
+
+def earlier(trace: Trace) -> Trace:
+    """A proposal is executed three samples earlier, and the decisions say so, too."""
+    one = trace.decisions[trace.decisions["decision"] == "accept"].iloc[0]
+    name, samples = f"{one['robot']}.executing", trace.samples.copy()
+    k = int(np.argmax(samples[name] == one["number"]))
+    samples.loc[k - 3 : k, name] = one["number"]
+    before = [one.to_dict() | {"t_s": trace.sampled("t_s")[j]} for j in range(k - 3, k)]
+    decisions = pd.concat([pd.DataFrame(before), trace.decisions])
+    return replace(trace, samples=samples, decisions=decisions)
+
+
+def are_lost(frame: pd.DataFrame) -> Any:
+    return frame["received_s"].isna()
+
+
+FORGERIES: dict[str, tuple[str, Any]] = {
+    "a lost message arrives": ("arrival of ", column("messages", "received_s", lambda f: f["sent_s"] + 0.25, are_lost)),
+    "all arrive at once": ("arrival of ", column("messages", "received_s", lambda f: f["sent_s"])),
+    "a message is lost": ("arrival of ", column("messages", ["received_s", "read_s"], lambda f: np.nan, first(copy=0))),
+    "lost ones left out": ("what was sent before ", only("messages", lambda f: f[~are_lost(f) | (f["attempt"] == 0)])),
+    "copies left out": ("arrival of ", only("messages", lambda f: f[f["copy"] == 0])),
+    "a row twice": ("rows of messages", only("messages", lambda f: pd.concat([f, f.tail(1)]))),
+    "read before it arrives": ("reading of ", column("messages", "read_s", lambda f: f["sent_s"])),
+    "from a robot": ("who sends ", column("messages", "sender", lambda f: "ugv2", first(kind="proposal"))),
+    "sent after the end": ("who sends ", column("messages", "sent_s", lambda f: 1e18)),
+    "to another one": ("sending of proposal", column("proposals", "sender", lambda f: "ugv1")),
+    "sent earlier": ("sending of proposal", column("proposals", "issued_s", lambda f: f["issued_s"] - 0.05)),
+    "about another one": ("sending of answer", column("messages", "about", lambda f: 9, first(kind="answer"))),
+    "all positions heard": ("last position of ", column("samples", "ugv1.heard_ugv2_s", lambda f: f["t_s"])),
+    "another reference": ("velocity of the preset of ", column("samples", "ugv2.ref_vx_m_s", lambda f: 0.1)),
+    "nothing executed": ("number of the proposal", lambda trace: replace(trace, samples=trace.samples.assign(
+        **{f"{ugv}.executing": -1 for ugv in trace.ugvs}))),
+    "refusals called acceptances": ("number of ", column("decisions", "decision", lambda f: "accept")),
+    "executed before it arrived": ("number of the proposal", earlier),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FORGERIES)
+def test_what_the_channel_does_not_allow_is_refused(name: str) -> None:
+    due, edit = FORGERIES[name]
+    (line,) = impossible(edit(run()), run().scenario)
+    assert line["about"].startswith(due)
+
+
+def test_a_channel_that_is_declared_better_than_it_was_is_refused() -> None:
+    for better in ({"loss": 0.0}, {"delay_s": 0.1}, {"duplicate": 0.0}):
+        scenario = team(1, None, channel=CHANNEL | better, sensing=SENSING)
+        assert [*impossible(run(), scenario)]
+
+
+@pytest.mark.parametrize("method", ["b", "d"])
+def test_of_an_honest_run_nothing_is_said(method: str) -> None:
+    assert len(run(method).messages)
+    assert [*impossible(run(method), run(method).scenario)] == []
+
+
+def test_without_a_channel_answers_are_those_of_decisions_and_a_lost_uav_is_silent() -> None:
+    honest = simulate(load("two_uavs", {"duration_s": 12.0}), "d")
+    assert [*impossible(honest, honest.scenario)] == []
+    (line,) = impossible(only("decisions", lambda f: f[f["answer"] < 0])(honest), honest.scenario)
+    assert line["about"].startswith("sending of answer ")
+    south = honest.messages["sender"].eq("south")
+    for name, rows in (("sent_s", south), ("read_s", honest.messages["receiver"].eq("south"))):
+        forged = column("messages", name, lambda f: 11.0, lambda f, rows=rows: rows)(honest)
+        (line,) = impossible(forged, honest.scenario)
+        assert line["about"].startswith("what south ")
