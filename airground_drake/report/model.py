@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from airground_drake.base import files
-from airground_drake.base.errors import ReportError, one_line, short
+from airground_drake.base.errors import ReportError, short
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, Status
 from airground_drake.base.values import RECORDED
 from airground_drake.report.folder import PAGES
@@ -278,7 +278,7 @@ def read(folder: Path) -> Report:
 
 
 def _unusable(source: object, why: str) -> ReportError:
-    return ReportError(one_line(f"{source} is not a report that can be used: {why}"))
+    return ReportError(f"{source} is not a report that can be used: {why}")
 
 
 def _finite(text: str) -> float:

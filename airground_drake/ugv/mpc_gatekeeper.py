@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array, Flags, Indices
-from airground_drake.base.errors import PluginError, described, one_line, raised_as, short
+from airground_drake.base.errors import PluginError, described, raised_as, short
 from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import convex, outline
@@ -274,7 +274,7 @@ class PaperGatekeepers(Gatekeepers):
         if not isinstance(solution, Solution):
             returned = f"{short(repr(solution))}, of type {type(solution).__qualname__}"
             allowed = f"{Solution.__module__}.{Solution.__qualname__}"
-            raise PluginError(one_line(f"route {kind.__qualname__} returned {returned}; allowed: {allowed}"))
+            raise PluginError(f"route {kind.__qualname__} returned {returned}; allowed: {allowed}")
         return solution
 
 

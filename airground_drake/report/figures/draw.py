@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.base.errors import TraceError, one_line
+from airground_drake.base.errors import TraceError
 from airground_drake.base.registry import method_of
 from airground_drake.report.figures import findings, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
@@ -67,7 +67,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
     for trace in traces.values():
         if trace.robots != (known := [*trace.scenario.robots]):
             wrong = f"its robots are {', '.join(trace.robots)}; those of its scenario: {', '.join(known)}"
-            raise TraceError(one_line(f"run {trace.run}: {wrong}"))
+            raise TraceError(f"run {trace.run}: {wrong}")
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style(settings):
         chosen = _select(scenario, traces)

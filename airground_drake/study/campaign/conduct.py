@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, LimitError, UnknownNameError, one_line
+from airground_drake.base.errors import FolderError, LimitError, UnknownNameError
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.base.registry import RUN_CLAIMS
 from airground_drake.base.statuses import UNDECIDED
@@ -61,7 +61,7 @@ def conduct(
     store = Store(folder, _manifest(spec, limits), resume=resume)
     try:
         if (last := max(store.finished, default=0)) >= wanted.stop:
-            raise FolderError(one_line(f"{folder} has draw {last}; allowed: -n {last + 1} or more"))
+            raise FolderError(f"{folder} has draw {last}; allowed: -n {last + 1} or more")
         rule = InOrder(stopping, wanted) if stopping is not None else None
         known: Any = groupby(store.table().to_dict("records"), key=itemgetter("index"))
         met = rule is not None and any(rule.met(index, list(rows)) for index, rows in known)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base.errors import TraceError, UnknownNameError
 from airground_drake.base.registry import DISTANCES
 from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.sim.trace import Trace, load
@@ -132,7 +132,7 @@ def _usable(run: Trace) -> Iterator[None]:
     try:
         yield
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise TraceError(one_line(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}")) from None
+        raise TraceError(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}") from None
 
 
 def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, limit_s: float) -> CoqReply:
