@@ -34,7 +34,7 @@ from airground_drake.model.plants.plant import HEADING, Plant
 from airground_drake.model.plants.scripted import Scripted
 from airground_drake.scenario.load import validated
 from airground_drake.scenario.schema import OwnController, Scenario
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_output, weakly
 
 START_M = 1e-9  # a body may begin this far from its start, m: forward kinematics err by less
 
@@ -80,9 +80,10 @@ class SteeredBody(LeafSystem):
         self.DeclareDiscreteState(np.append(0.0, plant.memory()))
         needs = {self._velocity.ticket(), self._base.ticket(), self.xd_ticket(), self.time_ticket()}
         names = plant.signals
-        self.DeclareVectorOutputPort("signals", len(names), weakly(self._calc), prerequisites_of_calc=needs)
+        declare_output(self, "signals", len(names), type(self)._signals, needs)
         if HEADING in names:
-            self.DeclareVectorOutputPort("heading", 1, weakly(self._calc_heading), prerequisites_of_calc=needs)
+            heading = [names.index(HEADING)]
+            declare_output(self, "heading", 1, lambda self, context: self._signals(context)[heading], needs)
         self.DeclarePeriodicDiscreteUpdateEvent(period_s, 0.0, weakly(self._update))
 
     def _since(self, context: Context) -> tuple[float, Array]:
@@ -96,13 +97,9 @@ class SteeredBody(LeafSystem):
         memory = self._plant.remembered(memory, self._velocity.Eval(context), elapsed)
         discrete.set_value(0, np.append(context.get_time(), memory))
 
-    def _calc(self, context: Context, output: BasicVector) -> None:
+    def _signals(self, context: Context) -> Array:
         elapsed, memory = self._since(context)
-        output.SetFromVector(self._plant.at(memory, self._base.Eval(context), self._velocity.Eval(context), elapsed))
-
-    def _calc_heading(self, context: Context, output: BasicVector) -> None:
-        signals = self.GetOutputPort("signals").Eval(context)
-        output.SetFromVector(signals[[self._plant.signals.index(HEADING)]])
+        return self._plant.at(memory, self._base.Eval(context), self._velocity.Eval(context), elapsed)
 
 
 def steered_plant(body: Body, period_s: float) -> Diagram:
@@ -384,14 +381,12 @@ class VelocityDisturbance(LeafSystem):
         super().__init__()
         self._command = self.DeclareVectorInputPort("command", 3 * len(robots))
         self._disturbances = [self.DeclareVectorInputPort(f"disturbance_{robot}", 3) for robot in robots]
-        inputs = (self._command, *self._disturbances)
-        self.DeclareVectorOutputPort(
-            "velocity", 3 * len(robots), weakly(self._calc), prerequisites_of_calc={port.ticket() for port in inputs}
-        )
+        needs = {port.ticket() for port in (self._command, *self._disturbances)}
+        declare_output(self, "velocity", 3 * len(robots), type(self)._velocity, needs)
 
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        velocity = self._command.Eval(context).copy()
+    def _velocity(self, context: Context) -> Array:
+        velocity: Array = self._command.Eval(context).copy()
         for i, port in enumerate(self._disturbances):
             if port.HasValue(context):
                 velocity[3 * i : 3 * i + 3] += port.Eval(context)
-        output.SetFromVector(velocity)
+        return velocity

@@ -1,5 +1,6 @@
 """Named views of vectors in ports and Contexts, and the types of messages."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, short
 from airground_drake.model.bodies.kinds import Kind
 from airground_drake.model.bodies.world import World
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_output, weakly
 from airground_drake.uav.messages import Report
 from airground_drake.uav.policy import Proposal
 
@@ -73,15 +74,16 @@ def keep(state: State, index: int, value: Any) -> EventStatus:
 
 
 def declare_inbox(
-    system: LeafSystem, count: int, state: set[Any], held: Any, outbox: Any, *, now: bool = False
+    system: Any, count: int, state: set[Any], held: Callable[[Any, Context], Any], *, now: bool = False
 ) -> InputPort:
     """Declare the ports of UGVs on a channel: in `inbox`; out `proposals`, those they hold, and `outbox`."""
     # now: whether what has just arrived is answered before the state is updated
     inbox = system.DeclareAbstractInputPort("inbox", Value(()))
     needs = {*state, inbox.ticket()}
-    system.DeclareAbstractOutputPort("proposals", lambda: no_proposals(count), held, prerequisites_of_calc=needs)
-    answered = needs if now else state
-    system.DeclareAbstractOutputPort("outbox", lambda: Value(()), outbox, prerequisites_of_calc=answered)
+    declare_output(system, "proposals", no_proposals(count), held, needs)
+    declare_output(
+        system, "outbox", Value(()), lambda self, context: self.desk(context).outbox, needs if now else state
+    )
     return inbox
 
 
