@@ -159,7 +159,7 @@ def _taken_back(trace: Trace, robot: str) -> list[str]:
 def minimum_distance(trace: Trace, robot: str) -> list[float]:
     """Smallest distance to any obstacle over continuous time, m."""
     nearest = closest_obstacle(trace, robot)
-    return [] if nearest is None else [nearest.value_m]
+    return [] if nearest is None else [nearest.value]
 
 
 @measure

@@ -189,20 +189,22 @@ def _points(trace: Trace, robots: list[str], marks: Sequence[maps.Mark]) -> Tabl
 
 def _distances(chosen: _Selection) -> Figure | None:
     near = {(heading, ugv): close_by(trace, ugv) for heading, trace in chosen.shown.items() for ugv in chosen.ugvs}
-    most = max((at.required_m for those in near.values() for at in those), default=None)
+    most = max((at.safe_distance_m for those in near.values() for at in those), default=None)
     if most is None:
         return None
-    near = {key: [at for at in those if at is those[0] or at.value_m < NEAR * most] for key, those in near.items()}
+    near = {key: [at for at in those if at is those[0] or at.value < NEAR * most] for key, those in near.items()}
     top = FARTHEST * most
     world = [*chosen.first.scenario.barriers, *chosen.first.robots]
-    met = {ugv: {at.other for (_, robot), those in near.items() if robot == ugv for at in those} for ugv in chosen.ugvs}
+    met = {
+        ugv: {at.second for (_, robot), those in near.items() if robot == ugv for at in those} for ugv in chosen.ugvs
+    }
     looks = {ugv: {other: k for k, other in enumerate(filter(met[ugv].__contains__, world))} for ugv in chosen.ugvs}
     half = (len(chosen.ugvs) + 1) // 2  # a single run takes both columns of the page
     columns = [chosen.ugvs] if len(chosen.shown) > 1 else [chosen.ugvs[:half], chosen.ugvs[half:]]
     panels = list[Panel]()
     for heading, trace, ugvs in [(*run, ugvs) for run in chosen.shown.items() for ugvs in columns if ugvs]:
         of_ugvs = {ugv: near[heading, ugv] for ugv in ugvs}
-        gaps = {f"{ugv} to {at.other}": gap_m(trace, ugv, at.other) for ugv, those in of_ugvs.items() for at in those}
+        gaps = {f"{ugv} to {at.second}": gap_m(trace, ugv, at.second) for ugv, those in of_ugvs.items() for at in those}
         smallest = "; ".join(
             f"{ugv} {those[0]} to {those[0].whom} at {those[0].t_s:.2f} s" for ugv, those in of_ugvs.items() if those
         )
@@ -215,7 +217,7 @@ def _distances(chosen: _Selection) -> Figure | None:
     at, ugv, heading = min(pairs, key=lambda pair: pair[0].margin_m)
     least = "Too close" if at.is_short else "Closest"
     least += f": {ugv} is {at} from {at.whom} at {at.t_s:.2f} s"
-    least += f", {at.required_m:g} m required"
+    least += f", {at.safe_distance_m:g} m required"
     caption = (
         f"{least} ({_runs(heading).lower()}). No line may enter the hatched band. "
         f"Circle: the smallest distance, exact; red: too small.{_left_out(chosen, chosen.ugvs)}"

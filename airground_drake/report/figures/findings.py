@@ -37,14 +37,14 @@ def recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
     least = [near for trace in runs.values() for ugv in trace.ugvs if (near := closest_obstacle(trace, ugv))]
     if not (printed and augmented and least):
         return None
-    robot = min(least, key=lambda near: near.value_m).robot
+    robot = min(least, key=lambda near: near.value).first
     lines, marks = {}, {}
     for name, trace in runs.items():
         how = f"{name}: {scenario.runs[name].composition.replace('_', ' ')}"
         lines[how] = trace.t, nearest_distance(trace, robot)
         if near := closest_obstacle(trace, robot):
-            lines["safe distance"] = np.array([0.0, trace.t[-1]]), np.full(2, near.required_m)
-            marks[f"closest, {name}"] = near.t_s, near.value_m
+            lines["safe distance"] = np.array([0.0, trace.t[-1]]), np.full(2, near.safe_distance_m)
+            marks[f"closest, {name}"] = near.t_s, near.value
     title = f"Distance of {robot} to the nearest obstacle"
     return of_finding(Chart(title, "time, s", "distance, m", lines, marks), 1)
 
