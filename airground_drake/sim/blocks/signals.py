@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from pydrake.common.containers import namedview
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, EventStatus, InputPort, LeafSystem, State
+from pydrake.systems.framework import Context, EventStatus, InputPort, LeafSystem, OutputPort, State, System
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, short
@@ -27,6 +27,14 @@ UgvGains = namedview("UgvGains", ["avoidance_gain_1_s", "motion_gain_1_s", "inte
 UavGains = namedview("UavGains", ["avoidance_gain_1_s", "formation_gain_1_s"])
 # Parameters of `EventTrigger`: see `model.trigger.automaton.Trigger`.
 TriggerLevels = namedview("TriggerLevels", ["zeta_m", "release_m", "dwell_s"])
+
+
+def inputs_of(system: System) -> list[InputPort]:
+    return [system.get_input_port(i) for i in range(system.num_input_ports())]
+
+
+def outputs_of(system: System) -> list[OutputPort]:
+    return [system.get_output_port(i) for i in range(system.num_output_ports())]
 
 
 def declare_bodies(system: LeafSystem, world: World) -> InputPort:
