@@ -80,11 +80,7 @@ class Inputs:
 
 
 class Gatekeepers(abc.ABC):
-    """The UGVs of a team, as they judge proposals.
-
-    Attributes:
-        law: their control law, with the scenario's gains.
-    """
+    """The UGVs of a team, as they judge proposals, and the control law that they have, with the scenario's gains."""
 
     def __init__(
         self, world: World, law: UgvLaw, presets: Sequence[Motion], unreported: Collection[str] = frozenset()
