@@ -147,10 +147,7 @@ def expected_numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) 
 
 
 def missing(
-    scenario: Scenario,
-    traces: Mapping[str, Trace],
-    claims: Sequence[Mapping[str, Any]],
-    required: Iterable[str] = (),
+    scenario: Scenario, traces: Mapping[str, Trace], claims: Sequence[Mapping[str, Any]], required: Iterable[str] = ()
 ) -> list[dict[str, str]]:
     """Runs without a trace or any verdict; claims that are expected, required or added, but nobody checked."""
     checked = {(claim["run"], claim["id"]) for claim in claims}

@@ -5,12 +5,7 @@ from collections.abc import Iterable
 from importlib import import_module
 from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-)
+from pydantic import AfterValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from airground_drake.base.limits import MAX_CORNERS, MAX_NAME, MAX_SEED

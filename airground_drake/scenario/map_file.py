@@ -75,10 +75,7 @@ def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
     content = _content(image, MOST_BYTES, document.where("image"), "image", "a PGM, PPM, PNG or BMP file")
     try:
         cells = occupancy(
-            content,
-            occupied_above=about.occupied_thresh,
-            free_below=about.free_thresh,
-            negate=bool(about.negate),
+            content, occupied_above=about.occupied_thresh, free_below=about.free_thresh, negate=bool(about.negate)
         )
     except ValueError as error:
         fault = Fault(f"{about.image} is {error}")

@@ -12,13 +12,7 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import (
-    BasicVector,
-    Context,
-    DiscreteValues,
-    LeafSystem,
-    NumericParameterIndex,
-)
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, NumericParameterIndex
 
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import PluginError, described, raised_as, short

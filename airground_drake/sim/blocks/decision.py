@@ -22,15 +22,7 @@ from airground_drake.base.errors import PluginError, short
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.trigger.automaton import NEW, Trigger, advance, anything_due, are_numbers, begin
-from airground_drake.model.trigger.excursion import (
-    Corners,
-    bends,
-    extremes,
-    gathered,
-    ranges,
-    stretches,
-    variables,
-)
+from airground_drake.model.trigger.excursion import Corners, bends, extremes, gathered, ranges, stretches, variables
 from airground_drake.sim.blocks.lifetime import declare_cached, declare_output, weakly
 from airground_drake.sim.blocks.signals import TriggerLevels, components_of, declare_bodies
 

@@ -10,15 +10,7 @@ from typing import Any, TypeVar
 from weakref import ref
 
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import (
-    Context,
-    Diagram,
-    DiagramBuilder,
-    InputPort,
-    LeafSystem,
-    OutputPort,
-    ValueProducer,
-)
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort, ValueProducer
 
 S = TypeVar("S", bound=LeafSystem)
 

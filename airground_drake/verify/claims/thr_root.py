@@ -95,7 +95,4 @@ def two_signs(what: str, ends: RootInterval) -> list[Hypothesis]:
 
 def as_floats(rule: ThresholdRule, root: RootInterval, prefix: str = "") -> dict[str, list[float]]:
     """The enclosures of u and of the threshold, m."""
-    return {
-        f"{prefix}u": [float(u) for u in root[:2]],
-        f"{prefix}zeta_m": [float(rule.zeta(u)) for u in root[:2]],
-    }
+    return {f"{prefix}u": [float(u) for u in root[:2]], f"{prefix}zeta_m": [float(rule.zeta(u)) for u in root[:2]]}

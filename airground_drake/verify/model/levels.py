@@ -15,11 +15,7 @@ def levels_of(scenario: Scenario) -> dict[str, float]:
     zeta = float(threshold_m(scenario))
     if decision.trigger == "bare":
         return {"zeta_m": zeta, "released_below_m": zeta, "dwell_s": 0.0}
-    return {
-        "zeta_m": zeta,
-        "released_below_m": float(decision.release_m),
-        "dwell_s": float(decision.min_inter_event_s),
-    }
+    return {"zeta_m": zeta, "released_below_m": float(decision.release_m), "dwell_s": float(decision.min_inter_event_s)}
 
 
 def threshold_m(scenario: Scenario) -> float:
