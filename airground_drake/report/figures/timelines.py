@@ -90,9 +90,6 @@ TOGETHER_S = 0.2  # events that follow each other within this time share a label
 _LEFT_IN, _RIGHT_IN, _ROW_IN, _LINE_IN, _CHAR_IN = 0.55, 1.05, 0.75, 0.15, 0.066
 _COLORS = {"accept": canvas.GOOD, "refuse": canvas.ALARM, "release": canvas.MUTED, "over": canvas.MUTED}
 # Look of the band below the safe distance.
-_FORBIDDEN: dict[str, Any] = {
-    "facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0,
-}  # fmt: skip
 
 
 def distances(
@@ -103,7 +100,7 @@ def distances(
     required = sorted({at.safe_distance_m for those in near.values() for at in those})
     for axes, (ugv, those) in zip(every, near.items(), strict=True):
         bottom = min(0.0, *(at.value for at in those)) if those else 0.0
-        axes.axhspan(bottom, required[0], **_FORBIDDEN)
+        axes.axhspan(bottom, required[0], **canvas.FORBIDDEN)
         labels = [(d, f"required {d:.3g}", canvas.INK) for d in required]
         for d in required:
             canvas.level(axes, d, "-")
