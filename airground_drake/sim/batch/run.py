@@ -40,7 +40,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, accepted_proposals, sightings
-from airground_drake.uav.planner import PlannerState, sent_after
+from airground_drake.uav.planner import Instant, PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import GatekeeperDecision
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
@@ -345,11 +345,9 @@ class Going:
             return None
         places = state.place.copy()
         stands = standing(watched(state.halts, t, places.reshape(-1), self._team.room), t).tolist()
-        planned = batch.planner.plan(
-            memory, t, places[: len(batch.world.robots)], intervening, np.array(answers), reports, stands,
-            sightings(batch.world, t, places),
-        )  # fmt: skip
-        return sent_after(memory, planned, t, batch.planner.sender)
+        moving, robots = sightings(batch.world, t, places), places[: len(batch.world.robots)]
+        now = Instant(t, robots, intervening, np.array(answers), reports, stands, moving)
+        return sent_after(memory, batch.planner.plan(memory, now), t, batch.planner.sender)
 
     def _judged(self) -> GatekeeperState:
         """What the gatekeepers remember after a sample."""

@@ -19,7 +19,7 @@ from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import Report, Reports, sightings
 from airground_drake.uav.outbox import answers_heard
-from airground_drake.uav.planner import Planner, PlannerState, sent_after
+from airground_drake.uav.planner import Instant, Planner, PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
 
 
@@ -143,10 +143,8 @@ class InterventionPlanner(LeafSystem):
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         moving = sightings(self._world, t, bodies)
         others = () if self._others is None else self._others.Eval(context)
-        memory = self._planner.plan(
-            before, t, bodies[self._robots], intervening, answers, reports, stands, moving, others
-        )
-        return sent_after(before, memory, t, self._planner.sender)
+        now = Instant(t, bodies[self._robots], intervening, answers, reports, stands, moving, others)
+        return sent_after(before, self._planner.plan(before, now), t, self._planner.sender)
 
 
 class AllProposals(LeafSystem):
