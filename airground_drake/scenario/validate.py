@@ -7,6 +7,7 @@ the first. Plug-ins that a scenario names are not imported here.
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import combinations, pairwise, starmap
@@ -21,7 +22,7 @@ from airground_drake.base.registry import ARRIVAL, METHODS, MODEL_CLAIMS, ROUTES
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.plants.plant import Setting
-from airground_drake.model.trigger.bayes import COMPUTED
+from airground_drake.model.trigger.bayes import threshold
 from airground_drake.scenario import hints
 from airground_drake.scenario.budget import PairBudget, budget, takes_room
 from airground_drake.scenario.outlines import outlines_of
@@ -347,9 +348,7 @@ def _periods(scenario: Scenario) -> Problems:
 
 def _release(scenario: Scenario) -> Problems:
     decision, rule = scenario.decision, scenario.decision.threshold
-    zeta = rule.zeta_m
-    if rule.rule in COMPUTED:
-        zeta = COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+    zeta = threshold(**asdict(rule))
     if decision.trigger == "automaton" and not decision.release_m < zeta:
         yield "decision.release_m", decision.release_m, f"less than the {rule.rule} threshold, {zeta:.9g} m"
 

@@ -143,7 +143,7 @@ def build_model(
         raise PluginError(f"decision_block is {short(repr(decision_block))}; allowed: a subclass of DecisionBlock")
     block = _checked_block(n, decision_block(world, presets))
     shortest = min(scenario.control.period_s, scenario.decision.noise_period_s)
-    trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)), shortest)
+    trigger = EventTrigger(n, components.make_trigger(scenario), shortest)
     decision = _decision_making(scenario, n, block, trigger)
     made = {body.name: plant_system(body, scenario.control.period_s, plants) for body in world.moving}
     signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))

@@ -90,8 +90,7 @@ class Batch:
         self.gatekeepers: Gatekeepers | None = components.make_gatekeepers(given, self.law) if method.gated else None
         self._avoidance = components.make_avoidance(given)
         self.near = Around(world.around(world.select("ugv")), world.around(world.select("uav")))
-        zeta = components.threshold(given)
-        trigger, noise = components.make_trigger(given, zeta), given.decision
+        trigger, noise = components.make_trigger(given), given.decision
         breaks, places = components.stack_presets(presets)
         scripts = [vertices_of(body) for body in world.moving[r:]]
         gated, steering = self.gatekeepers is not None, world.steering
@@ -130,7 +129,7 @@ class Batch:
             body.plant.heading_rad if isinstance(body.plant, Unicycle) else 0.0 for body in world.bodies[:n]
         ])  # fmt: skip
         self.rows = int(1.3 * len(ticks)) + 400
-        self.zeta = float(zeta)
+        self.zeta = float(trigger.zeta)
 
     @cached_property
     def meta(self) -> dict[str, Any]:

@@ -159,9 +159,7 @@ def levels_by(decision: Decision, zeta: float) -> TriggerLevels:
         raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")
     if rule.rule != "fixed" and not _is_root(rule, zeta):
         raise TraceError(f"the threshold in force, {zeta} m, is not what the scenario's rule computes")
-    if decision.trigger == "bare":
-        return TriggerLevels(zeta, zeta, 0.0)
-    return TriggerLevels(zeta, decision.release_m, decision.min_inter_event_s)
+    return TriggerLevels(*decision.levels(zeta))
 
 
 def _block(trace: Trace) -> str:
