@@ -44,9 +44,8 @@ class RunFacts:
         # Obstacles that may move.
         self.movers = [name for name, obstacle in self._scenario.obstacles.items() if obstacle.expected_speed_m_s]
         unique = {frozenset((near.first, near.second)): near for near in reversed([*self.run.pairs()])}
-        self.near = sorted(
-            unique.values(), key=lambda near: (near.margin_m, near.first, near.second)
-        )  # the least distance of each pair, those of least margin first
+        # The least distance of each pair, those of least margin first.
+        self.near = sorted(unique.values(), key=lambda near: (near.margin_m, near.first, near.second))
         # The first collision of each robot that collided, an event. What these robots do later does not count.
         self.hits = first_collisions(event.model_dump() for event in self.run.events if event.kind == "collision")
         self.collided = bool(self.hits)

@@ -78,9 +78,8 @@ def of_map(name: str) -> str:
 def is_report(folder: Path) -> bool:
     try:
         with open(files.open_regular(folder / PAGES["json"]), "rb") as file:
-            beginning = min(
-                100, os.fstat(file.fileno()).st_size
-            )  # files of the kernel have size 0, and reading may block
+            # Files of the kernel have size 0, and reading may block.
+            beginning = min(100, os.fstat(file.fileno()).st_size)
             return _OURS.match(file.read(beginning)) is not None
     except OSError:
         return False

@@ -75,13 +75,9 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
         drawn += [_team(chosen)] if len(chosen.first.ugvs) > MAX_TEAM else []
         compared = findings.recursion(scenario, traces)
     counterpart = dict(zip(_NUMBERED, numbers, strict=False))
-    return [
-        replace(figure, title=f"{figure.title} (the paper's {counterpart[figure.id]})")
-        if figure.id in counterpart
-        else figure
-        for figure in [*drawn, compared]
-        if figure is not None
-    ]
+    figures = [figure for figure in [*drawn, compared] if figure is not None]
+    ours = {figure.id: f" (the paper's {counterpart[figure.id]})" for figure in figures if figure.id in counterpart}
+    return [replace(figure, title=f"{figure.title}{ours.get(figure.id, '')}") for figure in figures]
 
 
 def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
@@ -195,9 +191,7 @@ def _distances(chosen: _Selection) -> Figure | None:
     near = {key: [at for at in those if at is those[0] or at.value < NEAR * most] for key, those in near.items()}
     top = FARTHEST * most
     world = [*chosen.first.scenario.barriers, *chosen.first.robots]
-    met = {
-        ugv: {at.second for (_, robot), those in near.items() if robot == ugv for at in those} for ugv in chosen.ugvs
-    }
+    met = {ugv: {at.second for those in near.values() for at in those if at.first == ugv} for ugv in chosen.ugvs}
     looks = {ugv: {other: k for k, other in enumerate(filter(met[ugv].__contains__, world))} for ugv in chosen.ugvs}
     half = (len(chosen.ugvs) + 1) // 2  # a single run takes both columns of the page
     columns = [chosen.ugvs] if len(chosen.shown) > 1 else [chosen.ugvs[:half], chosen.ugvs[half:]]
@@ -280,9 +274,7 @@ def _team(chosen: _Selection) -> Figure:
             if values
         )
         table = Table(f"{what}, over the UGVs", ("run", "UGVs", "least", "median", "largest"), rows)
-        says = "; ".join(
-            f"run {name}: {least} to {largest}, median {middle}" for name, _, least, middle, largest in rows
-        )
+        says = "; ".join(f"run {run}: {least} to {largest}, median {middle}" for run, _, least, middle, largest in rows)
         drawing, heading = timelines.histogram(what, of_runs), f"UGVs by {what.partition(',')[0]}"
         panels.append(panel(drawing, f"team-{position}", f"UGVs by {what}", says, heading, table))
     there = []
