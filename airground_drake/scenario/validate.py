@@ -386,8 +386,6 @@ class _Body(NamedTuple):
 
 
 Apart = tuple[str, float]  # a safe distance: its key, and its value, m
-# The key of that of two robots, by their kinds.
-APART = {("ugv", "ugv"): "ugv_m", ("ugv", "uav"): "air_ground_m", ("uav", "uav"): "uav_m"}
 
 
 def apart_of(scenario: Scenario, name: str) -> Apart:
@@ -507,7 +505,6 @@ def _filled(scenario: Scenario) -> str:
 def _clearances(scenario: Scenario) -> Problems:
     """No robot may start or end within the safe distance of an obstacle or of another robot."""
     robots, outlines = scenario.robots, {name: outlines_of(scenario, body) for name, body in scenario.barriers.items()}
-    kinds = {name: scenario.kind_of(name) for name in robots}
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
         points = {name: getattr(robot, attribute) for name, robot in robots.items()}
         near = list[tuple[str, str, float, Apart]]()  # a robot, what it is too near to, the gap, m, and what is needed
@@ -516,11 +513,11 @@ def _clearances(scenario: Scenario) -> Problems:
                 continue  # where robots are when it comes or appears is judged in each run
             needed = apart_of(scenario, name)
             for robot, point in points.items():
-                apart = convex.distances(rows, np.array(point), kinds[robot] == "ugv") - rows[:, outline.RADIUS]
+                apart = convex.distances(rows, np.array(point), robot in scenario.ugvs) - rows[:, outline.RADIUS]
                 near.append((robot, name, float(apart.min()) - robots[robot].radius_m, needed))
         for other, robot in combinations(robots, 2):
             gap = math.dist(points[robot], points[other]) - (robots[robot].radius_m + robots[other].radius_m)
-            near.append((robot, other, gap, _apart(scenario, APART[kinds[other], kinds[robot]])))
+            near.append((robot, other, gap, _apart(scenario, f"{scenario.pair_of(other, robot)}_m")))
         for robot, other, gap, (kind, least) in near:
             if gap < least - TOLERANCE:
                 what = f"{verb} {gap:.9g} m from {other}{_filled(scenario) if other == MAP else ''}"
