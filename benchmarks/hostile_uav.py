@@ -5,7 +5,6 @@ It may speak without a trigger, and at every planning instant. A `Tactic` says h
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -16,8 +15,8 @@ from airground_drake.model.geometry import outline
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.geometry.outline import BASE, COUNT, EXTENT, GAP, MIDDLE, RADIUS
 from airground_drake.uav.database import Negotiation
-from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, Proposals, Reports, Sighting, answer_to
-from airground_drake.uav.planner import Planner, PlannerState
+from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, answer_to
+from airground_drake.uav.planner import Instant, Planner, PlannerState
 from airground_drake.uav.policy import Proposal
 
 CHOICES: dict[str, tuple[Any, ...]] = {
@@ -95,25 +94,11 @@ class LyingPlanner(Planner):
         """It never sleeps."""
         return -math.inf
 
-    def plan(
-        self,
-        memory: PlannerState,
-        t: float,
-        positions: Array,
-        intervening: Sequence[bool],
-        answers: Array,
-        reports: Reports,
-        standing: Sequence[bool] = (),
-        sightings: Sequence[Sighting] = (),
-        others: Proposals = (),
-    ) -> PlannerState:
-        """Speak, whatever the answers and reports."""
-        return self._speak(memory, t, positions, answers)
-
-    def _speak(self, memory: PlannerState, t: float, positions: Array, answers: Array) -> PlannerState:
-        tactic, talks = self.tactic, list(memory.talks)
+    def plan(self, memory: PlannerState, now: Instant) -> PlannerState:
+        """Speak, whatever the reports."""
+        tactic, talks, t, positions = self.tactic, list(memory.talks), now.t, now.positions
         for i, talk in enumerate(talks):
-            before, answer = talk.proposal, answer_to(talk.proposal, answers, i)
+            before, answer = talk.proposal, answer_to(talk.proposal, now.answers, i)
             if before is not None and before.issued == t:
                 continue
             over = before is not None and (answer in (REFUSE, DONE) or t >= talk.retry_at)

@@ -10,7 +10,10 @@ VALUE_WIDTH, FAULT_WIDTH, TRACEBACK_CHARS = 120, 300, 4000
 
 
 class AirgroundError(Exception):
-    """Base class of the package's own exceptions."""
+    """Base class of the package's own exceptions. What one says is one printable line."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class Fault(str):
@@ -18,7 +21,7 @@ class Fault(str):
 
 
 class ScenarioError(AirgroundError):
-    """A scenario file that cannot be used. The message is one printable line.
+    """A scenario file that cannot be used.
 
     Attributes:
         source: file (with line where known) or command-line option.
@@ -31,7 +34,7 @@ class ScenarioError(AirgroundError):
         self.source, self.key, self.value, self.allowed = source, key, value, allowed
         where = f"{source}: {key}: " if key else f"{source}: "
         fault = str(value) if isinstance(value, Fault) else f"{short(repr(value))} is not allowed"
-        super().__init__(one_line(f"{where}{fault}; {allowed}"))
+        super().__init__(f"{where}{fault}; {allowed}")
 
 
 class LimitError(AirgroundError):
@@ -61,7 +64,7 @@ class UnknownNameError(AirgroundError):
     def __init__(self, kind: str, name: object, allowed: Iterable[str]) -> None:
         self.kind, self.name, self.allowed = kind, name, tuple(allowed)
         options = ", ".join(self.allowed) or "none"
-        super().__init__(one_line(f"unknown {kind} {short(repr(name))}; allowed: {options}"))
+        super().__init__(f"unknown {kind} {short(repr(name))}; allowed: {options}")
 
 
 class PluginError(AirgroundError):

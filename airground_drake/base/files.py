@@ -19,7 +19,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from airground_drake.base.errors import FolderError, one_line
+from airground_drake.base.errors import FolderError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,7 +64,7 @@ def refuse_links(folder: Path) -> None:
     # That is asked of a report or saved run before its files are opened; `open_regular` follows no link to a file.
     for path in chain(folder.glob("*"), folder.glob("*/*")):
         if path.is_symlink() and path.is_dir():
-            raise FolderError(one_line(f"{path} is a link; wanted: a folder"))
+            raise FolderError(f"{path} is a link; wanted: a folder")
 
 
 def open_pipe(path: Path) -> BinaryIO:
@@ -227,7 +227,7 @@ def wanted(path: Path, what: str) -> Iterator[None]:
         yield
     except OSError as error:
         why = f"{error.filename or path} cannot be written: {error.strerror or error}"
-        raise FolderError(one_line(f"{why}; wanted: {what}")) from None
+        raise FolderError(f"{why}; wanted: {what}") from None
 
 
 def make_folder(folder: Path, what: str) -> None:
@@ -240,7 +240,7 @@ def make_folder(folder: Path, what: str) -> None:
 def try_to_create(path: Path) -> None:
     """Write a new file, in a folder that is created, and remove it; FolderError if it exists or cannot be written."""
     if os.path.lexists(path):
-        raise FolderError(one_line(f"{path} exists; name a file that does not"))
+        raise FolderError(f"{path} exists; name a file that does not")
     with wanted(path, "a file that can be written"):
         write_bytes(path, b"")
         path.unlink()

@@ -18,6 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from airground_drake.base.errors import short
 from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.usage import refuse
 from airground_drake.check import command as checker
@@ -148,7 +149,6 @@ def _proved_again(folder: Path, lines: Sequence[CheckLine]) -> Iterator[CheckLin
 def _compared(run: str, entry: Any, recorded: Any) -> CheckLine:
     """Compare what Coq finds of a run with its entry in proofs.json, `recorded`; None if it has no entry."""
     from airground_drake.report.compare import differences
-    from airground_drake.report.lines import short
 
     line = partial(CheckLine, "proofs", run, by="Coq")
     kept, law = entry["distances"]["proved"], entry["law"]["proved"]
@@ -158,7 +158,7 @@ def _compared(run: str, entry: Any, recorded: Any) -> CheckLine:
         says += "; the report has no proof of this run"
     elif differing := [item for item in differences(recorded, entry) if not item[0].endswith((".seconds", ".why"))]:
         about, theirs, ours = differing[0]
-        says = f"Coq here: {about} is {short(ours)}; recorded {short(theirs)}"
+        says = f"Coq here: {about} is {short(repr(ours))}; recorded {short(repr(theirs))}"
         return line(DISAGREES, says, "proofs.json says what Coq finds", about, recorded=theirs, recomputed=ours)
     outcome = AGREES if kept or not entry["expected"] else DISAGREES
     return line(outcome, says, "" if outcome == AGREES else "expected distances are kept")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from airground_drake.base.registry import DISTANCES
 from airground_drake.base.usage import positive, refuse
+from airground_drake.report.sentences import counted
 from airground_drake.scenario.options import Parser, option, parser_of
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def _runs(options: argparse.Namespace) -> int:
     code = 0
     for proof in prove_report(options.report, options.run, options.limit):
         print("\n".join(_lines(proof)), flush=True)
-        if (proof.expected or options.run) and not proof.distances.proved:
+        if (proof.about["expected"] or options.run) and not proof.distances.proved:
             code = EXIT_UNPROVED
     if proved.write(options.report):
         print(f"{options.report / 'report.html'} says so beside {DISTANCES}")
@@ -87,16 +88,16 @@ def _runs(options: argparse.Namespace) -> int:
 
 def _lines(proof: Proved) -> list[str]:
     lines = []
-    pairs = "1 pair" if proof.lawful == 1 else f"{proof.lawful} pairs"
-    some = "" if proof.lawful == proof.pairs else f" by {pairs} (of robots without lag, and with balls at rest)"
+    pairs, lawful = proof.about["pairs"], proof.about["lawful_pairs"]
+    some = f" by {counted(lawful, 'pair')} (of robots without lag, and with balls at rest)" if lawful < pairs else ""
     for what, answer in (
-        (f"all {proof.pairs} distances kept at all times", proof.distances),
+        (f"all {pairs} distances kept at all times", proof.distances),
         (f"avoidance law obeyed without error{some}", proof.law),
     ):
         if answer.proved:
             lines.append(f"run {proof.run}: {what}: proved in {answer.seconds:.1f} s ({answer.file})")
         else:
             lines.append(f"run {proof.run}: {what}: not proved: {answer.why}")
-    if not proof.expected:
+    if not proof.about["expected"]:
         lines.append(f"run {proof.run}: the scenario does not ask for it: it does not expect {DISTANCES} to hold")
     return lines

@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             mark = f"<!-- airground replay {files.sha256(f'{folder.resolve()}/{name}'.encode())} -->"
             if path.exists() and not (path.is_file() and mark.encode() in files.read_bytes(path)[-2 * len(mark) :]):
                 why = "is not a replay of this run of"
-                raise FolderError(one_line(f"{path} {why} {folder}; it is left alone; name another place, with -o"))
+                raise FolderError(f"{path} {why} {folder}; it is left alone; name another place, with -o")
             files.write_text(path, f"{page(scene(*trace_of(folder, name)))}{mark}\n")
             print(one_line(str(path)))
     return 0
@@ -57,5 +57,5 @@ def _paths(output: Path, runs: Sequence[str]) -> dict[str, Path]:
     if output.suffix != ".html":
         return {name: output / f"replay_{name}.html" for name in runs}
     if len(runs) > 1:
-        raise FolderError(one_line(f"{output} is one file for the runs {', '.join(runs)}; name a RUN, or a folder"))
+        raise FolderError(f"{output} is one file for the runs {', '.join(runs)}; name a RUN, or a folder")
     return {runs[0]: output}

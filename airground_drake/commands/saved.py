@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, UnknownNameError, one_line
+from airground_drake.base.errors import FolderError, UnknownNameError
 from airground_drake.report.folder import is_report
 
 if TYPE_CHECKING:
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
     if not is_report(folder):
-        raise FolderError(one_line(f"{folder} is not a report; allowed: a folder that `airground report` has written"))
+        raise FolderError(f"{folder} is not a report; allowed: a folder that `airground report` has written")
     files.refuse_links(folder)
     runs = sorted(path.parent.name for path in folder.glob("trace/*/meta.json"))
     if not runs:
-        raise FolderError(one_line(f"{folder} has no runs to replay; allowed: a report with trace/RUN/meta.json"))
+        raise FolderError(f"{folder} has no runs to replay; allowed: a report with trace/RUN/meta.json")
     if run not in (None, *runs):
         raise UnknownNameError("run", run, runs)
     return runs if run is None else [run]
@@ -31,7 +31,7 @@ def outside_reports(folder: Path, what: str) -> None:
     """Create a folder for `what`. Reports are left as they are: the checker refuses files that are not theirs."""
     for above in (folder.resolve(), *folder.resolve().parents):
         if is_report(above):
-            raise FolderError(one_line(f"{folder} is in the report {above}, which is complete; name another, with -o"))
+            raise FolderError(f"{folder} is in the report {above}, which is complete; name another, with -o")
     files.make_folder(folder, what)
 
 

@@ -107,12 +107,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
 
 
 def _findings(
-    progress: Progress,
-    scenario: Scenario,
-    traces: Mapping[str, Trace],
-    verdicts: Sequence[Verdict],
-    *,
-    audited: bool,
+    progress: Progress, scenario: Scenario, traces: Mapping[str, Trace], verdicts: Sequence[Verdict], *, audited: bool
 ) -> list[dict[str, Any]]:
     from airground_drake.report import audit
 

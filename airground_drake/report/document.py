@@ -103,13 +103,11 @@ def overall(
     elif undemonstrated:
         status = "not_as_expected"
         why = f"Findings about the paper that were not demonstrated: {', '.join(map(str, undemonstrated))}."
-    elif undecided or absent or not claims:
-        status, left = "inconclusive", [*undecided, *absent]
-        why = (
-            f"{counted(len(left), 'check')} could not be decided: {some([*map(_told, left)], MOST_LISTED)}."
-            if left
-            else "No checks."
-        )
+    elif left := [*undecided, *absent]:
+        status = "inconclusive"
+        why = f"{counted(len(left), 'check')} could not be decided: {some([*map(_told, left)], MOST_LISTED)}."
+    elif not claims:
+        status, why = "inconclusive", "No checks."
     else:
         status, why = "as_expected", f"All {counted(checks, 'check')} gave the verdict that the scenario declares."
     return {
@@ -147,10 +145,7 @@ def expected_numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) 
 
 
 def missing(
-    scenario: Scenario,
-    traces: Mapping[str, Trace],
-    claims: Sequence[Mapping[str, Any]],
-    required: Iterable[str] = (),
+    scenario: Scenario, traces: Mapping[str, Trace], claims: Sequence[Mapping[str, Any]], required: Iterable[str] = ()
 ) -> list[dict[str, str]]:
     """Runs without a trace or any verdict; claims that are expected, required or added, but nobody checked."""
     checked = {(claim["run"], claim["id"]) for claim in claims}

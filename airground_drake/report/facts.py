@@ -9,8 +9,8 @@ from typing import NamedTuple
 from airground_drake.base.registry import AS_TOLD, METHODS
 from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
-from airground_drake.report.model import Claim, OnTheWay, Report
-from airground_drake.report.outcomes import Near, named, pairs
+from airground_drake.report.model import Approach, Claim, OnTheWay, Report
+from airground_drake.report.outcomes import named
 from airground_drake.sim.collisions import first_collisions
 
 # What is known of a claim that was not judged.
@@ -43,8 +43,9 @@ class RunFacts:
         self.ugvs, self.uavs = [*self._scenario.ugvs], [*self._scenario.aerial]
         # Obstacles that may move.
         self.movers = [name for name, obstacle in self._scenario.obstacles.items() if obstacle.expected_speed_m_s]
-        unique = {frozenset((near.robot, near.other)): near for near in reversed([*pairs(self.run)])}
-        self.near = sorted(unique.values())  # the least distance of each pair, those of least margin first
+        unique = {frozenset((near.first, near.second)): near for near in reversed([*self.run.pairs()])}
+        # The least distance of each pair, those of least margin first.
+        self.near = sorted(unique.values(), key=lambda near: (near.margin_m, near.first, near.second))
         # The first collision of each robot that collided, an event. What these robots do later does not count.
         self.hits = first_collisions(event.model_dump() for event in self.run.events if event.kind == "collision")
         self.collided = bool(self.hits)
@@ -83,7 +84,7 @@ class RunFacts:
             for hit in events
             if (other := hit.get("other") or hit["obstacle"])
         ]
-        breaches = breaches or [Breach(near.robot, near.other, near.line) for near in self.near if near.is_short]
+        breaches = breaches or [Breach(near.first, near.second, near.line) for near in self.near if near.is_short]
         met = {frozenset((encounter["first"], encounter["second"])): encounter["doing"]
                for encounter in self.claim(rules.DISTANCES).evidence.get("encounters", ())}  # fmt: skip
         breaches = [breach._replace(doing=met.get(frozenset(breach[:2]), "")) for breach in breaches]
@@ -97,8 +98,8 @@ class RunFacts:
         among = {frozenset(breach[:2]) for breach in self.breaches}
         ends = {robot: hit["t_s"] for robot, hit in self.hits.items()}
         return sum(
-            near.is_short and {near.robot, near.other} not in among
-            and near.t_s < min(ends.get(body, near.t_s + 1.0) for body in (near.robot, near.other))
+            near.is_short and {near.first, near.second} not in among
+            and near.t_s < min(ends.get(body, near.t_s + 1.0) for body in (near.first, near.second))
             for near in self.near
         )  # fmt: skip
 
@@ -134,11 +135,9 @@ class RunFacts:
         met = dict.fromkeys(breach.second for breach in self.breaches if self._obeys)
         return [name for name in met if name in off_the_map]
 
-    def approaches(self) -> Iterator[Near]:
+    def approaches(self) -> list[Approach]:
         """The nearest approach after the start, and that of a mover if it is another one; else the least distance."""
-        yield from map(Near.of, self._metrics.came_near)
-        if not self._metrics.came_near:
-            yield from self.near[:1]
+        return self._metrics.came_near or self.near[:1]
 
     # Arrived?
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, one_line
+from airground_drake.base.errors import FolderError
 
 # The formats of a report, and the file of each.
 PAGES = {"html": "report.html", "json": "report.json", "junit": "junit.xml"}
@@ -36,7 +36,7 @@ def held(folder: Path) -> Iterator[None]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise FolderError(one_line(f"{folder} is in use by another report; name another folder")) from None
+            raise FolderError(f"{folder} is in use by another report; name another folder") from None
         except OSError:  # a file system without locks
             pass
         prepare(folder)
@@ -51,7 +51,7 @@ def prepare(folder: Path) -> None:
     with files.wanted(folder, "a folder for the report"):
         folder.mkdir(parents=True, exist_ok=True)
         if why := _refused(folder):
-            raise FolderError(one_line(f"{folder} holds {why}; {RULE}"))
+            raise FolderError(f"{folder} holds {why}; {RULE}")
         files.sweep(folder)
         for part in (folder, *_parts(folder)):
             files.try_to_write(part)
@@ -78,9 +78,8 @@ def of_map(name: str) -> str:
 def is_report(folder: Path) -> bool:
     try:
         with open(files.open_regular(folder / PAGES["json"]), "rb") as file:
-            beginning = min(
-                100, os.fstat(file.fileno()).st_size
-            )  # files of the kernel have size 0, and reading may block
+            # Files of the kernel have size 0, and reading may block.
+            beginning = min(100, os.fstat(file.fileno()).st_size)
             return _OURS.match(file.read(beginning)) is not None
     except OSError:
         return False

@@ -24,7 +24,6 @@ from airground_drake.report.figures import findings
 from airground_drake.report.figures.findings import of_chart
 from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.model import Claim, Report
-from airground_drake.report.outcomes import pairs
 from airground_drake.report.proved import place
 from airground_drake.report.screen import first_screen
 from airground_drake.report.sentences import MARKS, grouped, number, split, told, unbroken
@@ -89,7 +88,7 @@ MAX_ROWS, MAX_COLUMNS, MAX_CELL_CHARS = 40, 10, 200  # maximum size of a table; 
 def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
     # figures: as drawn by `figures.draw` and the like, in the order of the page.
     # diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
-    distances = [(name, pair) for name, run in report.runs.items() for pair in pairs(run)]
+    distances = [(name, pair) for name, run in report.runs.items() for pair in run.pairs()]
     distances.sort(key=lambda named: named[1].margin_m)
     plates = grouped((figure.beside or PLACES.get(figure.id, "happened"), figure) for figure in figures)
     diagram = _diagram(diagram_svg, report.scenario.name)

@@ -66,11 +66,9 @@ def _unexecuted(trace: Trace, sent: ProposalRecord, answers: Any) -> dict[str, A
     if len(about) and about.loc[about["kind"] == "proposal", "received_s"].isna().all():
         return _end("lost", sent.issued_s)
     withdrawn = about.loc[about["kind"] == "withdrawal", "sent_s"]
-    return (
-        _end("withdrawn first", float(withdrawn.min()))
-        if len(withdrawn)
-        else _end("end of the run", float(trace.t[-1]))
-    )
+    if len(withdrawn):
+        return _end("withdrawn first", float(withdrawn.min()))
+    return _end("end of the run", float(trace.t[-1]))
 
 
 def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float | None) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from airground_drake.base.errors import AirgroundError
+from airground_drake.base.errors import AirgroundError, short
 from airground_drake.base.progress import Progress
 from airground_drake.check.line import DISAGREES
 
@@ -21,14 +21,9 @@ def line_of(claim: str, run: str, outcome: str, text: str, rule: str = "") -> Li
 
 
 def different(claim: str, run: str, about: str, theirs: Any, ours: Any) -> Line:
-    text = f"made again, {about or 'it'} is {short(ours)}; recorded {short(theirs)}"
+    text = f"made again, {about or 'it'} is {short(repr(ours))}; recorded {short(repr(theirs))}"
     values = {"about": about, "recorded": theirs, "recomputed": ours}
     return line_of(claim, run, DISAGREES, text, "the files give what is recorded") | values
-
-
-def short(value: Any, most: int = 120) -> str:
-    text = repr(value)
-    return text if len(text) <= most else f"{text[:most]}..."
 
 
 def print_lines(lines: Callable[[Progress], Iterator[Line]], limit_s: str) -> int:

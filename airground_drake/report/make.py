@@ -31,25 +31,15 @@ Audit: TypeAlias = "Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]],
 
 
 class Wanted(NamedTuple):
-    """What a report should have, and what it may cost.
+    """What a report should have, and what it may cost."""
 
-    Attributes:
-        formats: which of html, json and junit to write; traces and diagram are always written.
-        command: how to make this report again.
-        kept: folder of kept findings about the model, see `judge_model`; None: everything anew.
-        audit: makes the findings about the paper; None: the report has no findings.
-        audited: whether these are all findings, so that each must be demonstrated.
-        limits: what the scenario may ask for.
-        seeds: with how many seeds, from 1 on, distances and arrivals are counted; 0: none.
-    """
-
-    formats: tuple[str, ...] = tuple(folder.PAGES)
-    command: str = ""
-    kept: Path | None = None
-    audit: Audit | None = None
-    audited: bool = False
-    limits: Limits = DEFAULT_LIMITS
-    seeds: int = 0
+    formats: tuple[str, ...] = tuple(folder.PAGES)  # of html, json and junit; traces and diagram are always written
+    command: str = ""  # how to make this report again
+    kept: Path | None = None  # folder of kept findings about the model, see `judge_model`; None: everything anew
+    audit: Audit | None = None  # makes the findings about the paper; None: the report has no findings
+    audited: bool = False  # whether these are all findings, so that each must be demonstrated
+    limits: Limits = DEFAULT_LIMITS  # what the scenario may ask for
+    seeds: int = 0  # with how many seeds, from 1 on, distances and arrivals are counted; 0: none
 
 
 def write_report(

@@ -1,7 +1,7 @@
 """Numbers of one run that every reader asks for: distances, events, decisions, times; strict JSON."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.registry import method_of
 from airground_drake.report.interventions import avoidance, farthest_from_prediction, interventions, messages
-from airground_drake.report.outcomes import Near
+from airground_drake.report.model import Approach
 from airground_drake.report.stalls import stalls
 from airground_drake.scenario.schema import MAP
 from airground_drake.sim.collisions import first_collisions
@@ -48,10 +48,10 @@ def of_run(trace: Trace) -> dict[str, Any]:
     counts = {robot: Counter(e["kind"] for e in trace.events if e["robot"] == robot) for robot in trace.robots}
     return {
         "min_distance_m": {
-            robot: _listed(trace, _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)) for robot in trace.robots
+            robot: _listed(_least(trace, robot, _obstacles(trace), MOST_OBSTACLES)) for robot in trace.robots
         },
         "min_robot_distance_m": {
-            robot: _listed(trace, _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)) for robot in trace.robots
+            robot: _listed(_least(trace, robot, _others(trace, robot), NEAR_ROBOTS)) for robot in trace.robots
         },
         "came_near": came_near(trace),
         "final_position_m": {robot: trace.position(robot)[-1].tolist() for robot in trace.robots},
@@ -82,7 +82,7 @@ def came_near(trace: Trace) -> list[dict[str, Any]]:
     bounds = apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
     order = np.argsort(bounds, kind="stable").tolist()
     moving = [k for k in order if kind_of(trace.scenario, pairs[k].first, pairs[k].second) == MOVING]
-    nearest = dict[tuple[str, str], dict[str, Any]]()
+    nearest = dict[Pair, dict[str, Any]]()
     for among in (order, moving):
         least: Gap | None = None
         for k in among:
@@ -92,9 +92,7 @@ def came_near(trace: Trace) -> list[dict[str, Any]]:
             if approach is not None and (least is None or approach.margin_m < least.margin_m):
                 least = approach
         if least is not None:
-            first, second = least.pair.first, least.pair.second
-            about = {"first": first, "second": second}
-            nearest.setdefault((first, second), about | _listed(trace, {second: least})[second])
+            nearest.setdefault(least.pair, _told(_nearest(trace, least.pair.first, least.pair.second, least)))
     return [*nearest.values()]
 
 
@@ -262,28 +260,17 @@ def _closest_call(trace: Trace) -> dict[str, Any] | None:
     }
 
 
-def closest_obstacle(trace: Trace, robot: str) -> Near | None:
+def closest_obstacle(trace: Trace, robot: str) -> Approach | None:
     """Smallest distance of a robot to any obstacle over continuous time, exact; None without obstacles."""
-    gaps = _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)
-    return min(_near(trace, robot, gaps), key=lambda near: (near.value_m, near.t_s), default=None)
+    near = _least(trace, robot, _obstacles(trace), MOST_OBSTACLES)
+    return min(near, key=lambda near: (near.value, near.t_s), default=None)
 
 
-def close_by(trace: Trace, robot: str) -> list[Near]:
+def close_by(trace: Trace, robot: str) -> list[Approach]:
     """Smallest distances of a robot to its nearest obstacles and robots, exact, those of least margin first."""
-    gaps = _least(trace, robot, _obstacles(trace), NEAR_OBSTACLES)
-    gaps |= _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)
-    return sorted(_near(trace, robot, gaps), key=lambda near: near.margin_m)
-
-
-def _near(trace: Trace, robot: str, gaps: dict[str, Gap]) -> Iterator[Near]:
-    for other, least in gaps.items():
-        about = (least.margin_m, robot, other, least.gap_m, least.pair.required_m, least.t_s)
-        yield Near(*about, at_m=_place(trace, other, least).get("at_m"))
-
-
-def _place(trace: Trace, other: str, least: Gap) -> dict[str, list[float]]:
-    """Where on the map a gap was smallest, if it is that to the map."""
-    return place_on_map(trace, least.pair.first, least.t_s) if other == MAP else {}
+    near = _least(trace, robot, _obstacles(trace), NEAR_OBSTACLES)
+    near += _least(trace, robot, _others(trace, robot), NEAR_ROBOTS)
+    return sorted(near, key=lambda near: near.margin_m)
 
 
 def gap_m(trace: Trace, robot: str, other: str) -> Array:
@@ -308,22 +295,26 @@ def events_of(trace: Trace, robot: str, *kinds: str) -> list[dict[str, Any]]:
     return [event for event in trace.events if event["robot"] == robot and event["kind"] in kinds]
 
 
-def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> dict[str, Gap]:
+def _least(trace: Trace, robot: str, among: Sequence[str], most: int) -> list[Approach]:
     """Smallest gaps of a robot to at most `most` of some obstacles or robots, those of least margin."""
     numbers = [numbers_of(trace)[frozenset((robot, other))] for other in among]
     pairs = [pairs_of(trace)[k] for k in numbers]
     bounds = apart_of(trace)[numbers] - np.array([pair.safe_m for pair in pairs])
     near = least_of(bounds, most, lambda k: least_gap(trace, pairs[k]).margin_m)
-    return {among[k]: least_gap(trace, pairs[k]) for k in near}
+    return [_nearest(trace, robot, among[k], least_gap(trace, pairs[k])) for k in near]
 
 
-def _listed(trace: Trace, gaps: dict[str, Gap]) -> dict[str, dict[str, Any]]:
-    return {
-        other: {
-            "value": least.gap_m, "t_s": least.t_s, "safe_distance_m": least.pair.required_m,
-            **_place(trace, other, least),
-            **({"appeared": True} if at_appearance(trace, least) else {}),
-            **({"moves": True} if kind_of(trace.scenario, least.pair.first, other) == MOVING else {}),
-        }
-        for other, least in gaps.items()
-    }  # fmt: skip
+def _nearest(trace: Trace, robot: str, other: str, least: Gap) -> Approach:
+    return Approach(
+        first=robot, second=other, value=least.gap_m, t_s=least.t_s, safe_distance_m=least.pair.required_m,
+        appeared=at_appearance(trace, least), moves=kind_of(trace.scenario, least.pair.first, other) == MOVING,
+        **(place_on_map(trace, least.pair.first, least.t_s) if other == MAP else {}),
+    )  # fmt: skip
+
+
+def _told(near: Approach, *but: str) -> dict[str, Any]:
+    return near.model_dump(exclude_defaults=True, exclude={*but})
+
+
+def _listed(near: Sequence[Approach]) -> dict[str, dict[str, Any]]:
+    return {at.second: _told(at, "first", "second") for at in near}

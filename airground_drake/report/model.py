@@ -3,16 +3,18 @@
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from airground_drake.base import files
-from airground_drake.base.errors import ReportError, one_line, short
+from airground_drake.base.errors import ReportError, short
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, Status
 from airground_drake.base.values import RECORDED
 from airground_drake.report.folder import PAGES
+from airground_drake.report.outcomes import SLACK_M, distance, metres, named
 from airground_drake.scenario.schema import Scenario
 
 SCHEMA = "airground_drake.report/4"
@@ -66,8 +68,34 @@ class Distance(Entry):
 
 
 class Approach(Distance):
+    """The smallest distance of a pair."""
+
     first: str
     second: str
+
+    @property
+    def margin_m(self) -> float:
+        return self.value - self.safe_distance_m
+
+    @property
+    def is_short(self) -> bool:
+        return self.margin_m < -SLACK_M
+
+    @property
+    def whom(self) -> str:
+        return named(self.second, self.at_m)
+
+    def __str__(self) -> str:
+        """The distance, without the pair."""
+        return distance(self.value, self.safe_distance_m)
+
+    @property
+    def line(self) -> str:
+        """The pair, its distance beside the required one, and when: a line of the first screen."""
+        told = metres(self.value, self.safe_distance_m).removesuffix(" m")
+        sign = "<" if self.is_short else "≥"
+        apart = f"overlap {told[1:]} m" if told.startswith("-") else f"{told} {sign} {self.safe_distance_m:g} m"
+        return f"{self.first}\N{EN DASH}{self.whom} {apart} at {f'{self.t_s:.2f} s' if self.t_s > 0.0 else 'the start'}"
 
 
 class Seed(Approach):
@@ -167,6 +195,12 @@ class Run(Entry):
     events: list[Event]
     faults: list[Json]  # of policies and solvers
     metrics: Metrics
+
+    def pairs(self) -> Iterator[Approach]:
+        """The smallest distances of all pairs that are listed."""
+        for nearest in (self.metrics.min_distance_m, self.metrics.min_robot_distance_m):
+            for robot, others in nearest.items():
+                yield from (Approach(first=robot, second=other, **dict(at)) for other, at in others.items())
 
     @property
     def no_way(self) -> list[str]:
@@ -278,7 +312,7 @@ def read(folder: Path) -> Report:
 
 
 def _unusable(source: object, why: str) -> ReportError:
-    return ReportError(one_line(f"{source} is not a report that can be used: {why}"))
+    return ReportError(f"{source} is not a report that can be used: {why}")
 
 
 def _finite(text: str) -> float:

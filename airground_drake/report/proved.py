@@ -12,7 +12,7 @@ from typing import Any
 from markupsafe import Markup
 
 from airground_drake.base import files
-from airground_drake.base.errors import ReportError, one_line
+from airground_drake.base.errors import ReportError
 from airground_drake.report.folder import PAGES
 from airground_drake.report.model import Claim
 from airground_drake.report.outcomes import distance
@@ -44,9 +44,7 @@ def write(folder: Path) -> bool:
     there[page.name] = files.sha256(text.encode())
     for name, digest in there.items():
         if report.get("files", {}).get(name) != digest:
-            raise ReportError(
-                one_line(f"{folder / name} is not the file that report.json names: the page stays as it is")
-            )
+            raise ReportError(f"{folder / name} is not the file that report.json names: the page stays as it is")
     text = filled(text, proofs)
     report["files"][page.name] = files.sha256(text.encode())
     files.write_text(page, text)

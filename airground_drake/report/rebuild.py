@@ -17,11 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
+from airground_drake.base.errors import short
 from airground_drake.base.registry import MODEL_CLAIMS
 from airground_drake.base.statuses import meets
 from airground_drake.check.line import AGREES, DISAGREES, OPEN, RECORDED
 from airground_drake.report.compare import WITHIN, differences
-from airground_drake.report.lines import Line, different, line_of, print_lines, short
+from airground_drake.report.lines import Line, different, line_of, print_lines
 
 WITHIN_PX = 0.02  # coordinates in drawings agree to this: they are rounded to 0.01
 
@@ -60,7 +61,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
             yield _with_note(line, other_code)
     except Exception as error:  # the parts that are taken as recorded may have any content
         why = f"{type(error).__name__}: {error}"
-        yield line_of("report.html", "", OPEN, f"the pages cannot be made again: {short(why)}", "pages")
+        yield line_of("report.html", "", OPEN, f"the pages cannot be made again: {short(repr(why))}", "pages")
 
 
 def with_events(trace: Any) -> Any:

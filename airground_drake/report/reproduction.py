@@ -1,4 +1,4 @@
-"""The paper's reported results against ours: a registry of measures, and the reproduction table.
+"""The paper's reported results against ours: measures, and the reproduction table.
 
 A measure is a pure function of a trace and a robot. It returns its components in the order of the scenario's
 `paper` values, 1 or 0 for a yes/no quantity, and an empty list if the run has no such value. A row without a value is
@@ -26,17 +26,8 @@ STILL_S = 1.0
 TRIGGER_TOLERANCE_M = 1e-5
 SHIFTED_M = 0.1  # a path that leaves its straight line by this is shifted
 
-MEASURES: dict[str, Measure] = {}  # measures by name; `@measure` adds one
 
-
-def measure(function: Measure) -> Measure:
-    """Register a measure under its function's name (a decorator)."""
-    MEASURES[function.__name__] = function
-    return function
-
-
-@measure
-def stall_position(trace: Trace, robot: str) -> list[float]:
+def _stall_position(trace: Trace, robot: str) -> list[float]:
     """Final [x, y] in m of a robot that stands still short of its target, and did not collide."""
     hit = robot in first_collisions(trace.events)
     if hit or trace.t[-1] - trace.t[0] < STILL_S or _arrived(trace, robot):
@@ -48,17 +39,15 @@ def stall_position(trace: Trace, robot: str) -> list[float]:
     return _planar(last_second[-1])
 
 
-@measure
-def distances_while_stalled(trace: Trace, robot: str) -> list[float]:
+def _distances_while_stalled(trace: Trace, robot: str) -> list[float]:
     """Final distances in m of a stalled robot to its two nearest obstacles, in the order of their names."""
-    if not stall_position(trace, robot):
+    if not _stall_position(trace, robot):
         return []
     distance = {name: float(gap_m(trace, robot, name)[-1]) for name in trace.scenario.barriers}
     return [distance[name] for name in sorted(sorted(distance, key=distance.__getitem__)[:2])]
 
 
-@measure
-def grows_past_threshold(trace: Trace, robot: str) -> list[float]:
+def _grows_past_threshold(trace: Trace, robot: str) -> list[float]:
     """1 if the decision variable ends above the threshold and grew from its crossing to the reference's end."""
     # A run in which the robot's intervention was released does not count: there it came back by itself.
     x, zeta = _decision_variable(trace, robot)
@@ -70,8 +59,7 @@ def grows_past_threshold(trace: Trace, robot: str) -> list[float]:
     return [float(x[-1] > zeta and x[reference_end] > x[above[0]])]
 
 
-@measure
-def grows_until_acceptance(trace: Trace, robot: str) -> list[float]:
+def _grows_until_acceptance(trace: Trace, robot: str) -> list[float]:
     """1 if the decision variable grew from first trigger to first acceptance, and later fell below the threshold."""
     # Empty without an acceptance.
     triggers, accepted = (_times(trace, robot, kind)[:1] for kind in ("trigger", "accept"))
@@ -82,8 +70,7 @@ def grows_until_acceptance(trace: Trace, robot: str) -> list[float]:
     return [float(at > before and x[trace.t > accepted[0]].min(initial=np.inf) < zeta)]
 
 
-@measure
-def path_shifts(trace: Trace, robot: str) -> list[float]:
+def _path_shifts(trace: Trace, robot: str) -> list[float]:
     """1 if the robot's path leaves a straight line by SHIFTED_M while interventions are executed; empty without any."""
     executed = np.flatnonzero(np.any([trace.executing(ugv) >= 0 for ugv in trace.ugvs], axis=0))
     if not executed.size:
@@ -94,20 +81,7 @@ def path_shifts(trace: Trace, robot: str) -> list[float]:
     return [float(np.linalg.norm(away - np.outer(away @ along, along), axis=1).max() >= SHIFTED_M)]
 
 
-@measure
-def arrives(trace: Trace, robot: str) -> list[float]:
-    """1 if the robot ends, or is before its first collision, within the arrival tolerance of its target."""
-    return [float(_arrived(trace, robot))]
-
-
-@measure
-def trigger_time(trace: Trace, robot: str) -> list[float]:
-    """Time of the first trigger, s."""
-    return _times(trace, robot, "trigger")[:1]
-
-
-@measure
-def recovery_duration(trace: Trace, robot: str) -> list[float]:
+def _recovery_duration(trace: Trace, robot: str) -> list[float]:
     """Time from the first trigger until the decision variable first falls below the threshold, s."""
     # The row of the trigger may be slightly below the threshold (accuracy of event isolation), so a fall starts from a
     # row at or above it. Rows are interpolated linearly.
@@ -123,12 +97,6 @@ def recovery_duration(trace: Trace, robot: str) -> list[float]:
     return [float(t[k] + (t[k + 1] - t[k]) * (x[k] - zeta) / (x[k] - x[k + 1]) - triggers[0])]
 
 
-@measure
-def intervention_succeeds(trace: Trace, robot: str) -> list[float]:
-    """1 if the robot arrives, triggered only at the threshold, and the gatekeeper accepted and never refused."""
-    return [float(not _shortcomings(trace, robot))]
-
-
 def _shortcomings(trace: Trace, robot: str) -> list[str]:
     """What an intervention lacks to succeed as in the paper."""
     triggers, accepted, refused = (_times(trace, robot, kind) for kind in ("trigger", "accept", "refuse"))
@@ -141,12 +109,6 @@ def _shortcomings(trace: Trace, robot: str) -> list[str]:
     return lacks if _arrived(trace, robot) else [*lacks, "it does not arrive"]
 
 
-@measure
-def acceptance_lasts(trace: Trace, robot: str) -> list[float]:
-    """1 if the gatekeeper never refused after its first acceptance and the robot arrives; empty without acceptance."""
-    return [float(not _taken_back(trace, robot))] if _times(trace, robot, "accept") else []
-
-
 def _taken_back(trace: Trace, robot: str) -> list[str]:
     """What became of an acceptance that did not last."""
     accepted = _times(trace, robot, "accept")[:1]
@@ -155,44 +117,47 @@ def _taken_back(trace: Trace, robot: str) -> list[str]:
     return lacks if _arrived(trace, robot) else [*lacks, "it does not arrive"]
 
 
-@measure
-def minimum_distance(trace: Trace, robot: str) -> list[float]:
+def _minimum_distance(trace: Trace, robot: str) -> list[float]:
     """Smallest distance to any obstacle over continuous time, m."""
     nearest = closest_obstacle(trace, robot)
-    return [] if nearest is None else [nearest.value_m]
+    return [] if nearest is None else [nearest.value]
 
 
-@measure
-def accepted_proposal_time(trace: Trace, robot: str) -> list[float]:
-    """Time at which the UAV sent the proposal that the gatekeeper first accepted, s."""
-    return _sent(trace, robot, "accept")
-
-
-@measure
-def refused_proposal_time(trace: Trace, robot: str) -> list[float]:
-    """Time at which the UAV sent the proposal that the gatekeeper first refused, s."""
-    return _sent(trace, robot, "refuse")
-
-
-@measure
-def execution_time(trace: Trace, robot: str) -> list[float]:
+def _execution_time(trace: Trace, robot: str) -> list[float]:
     """Time at which an intervention is first executed, s."""
     rows = np.flatnonzero(trace.executing(robot) >= 0)
     return [float(trace.t[max(rows[0] - 1, 0)])] if len(rows) else []
 
 
-@measure
-def final_position(trace: Trace, robot: str) -> list[float]:
-    """Position [x, y] in m at the end of the run."""
-    return _planar(trace.position(robot)[-1])
-
-
-@measure
-def collision_position(trace: Trace, robot: str) -> list[float]:
-    """Position [x, y] in m of the robot's first collision."""
-    hits = events_of(trace, robot, "collision")
-    return _planar(hits[0]["position_m"]) if hits else []
-
+# The measures by name.
+MEASURES: dict[str, Measure] = {
+    "stall_position": _stall_position,
+    "distances_while_stalled": _distances_while_stalled,
+    "grows_past_threshold": _grows_past_threshold,
+    "grows_until_acceptance": _grows_until_acceptance,
+    "path_shifts": _path_shifts,
+    "recovery_duration": _recovery_duration,
+    "minimum_distance": _minimum_distance,
+    "execution_time": _execution_time,
+    # 1 if the robot ends, or is before its first collision, within the arrival tolerance of its target.
+    "arrives": lambda trace, robot: [float(_arrived(trace, robot))],
+    # Time of the first trigger, s.
+    "trigger_time": lambda trace, robot: _times(trace, robot, "trigger")[:1],
+    # 1 if the robot arrives, triggered only at the threshold, and the gatekeeper accepted and never refused.
+    "intervention_succeeds": lambda trace, robot: [float(not _shortcomings(trace, robot))],
+    # 1 if the gatekeeper never refused after its first acceptance and the robot arrives; empty without acceptance.
+    "acceptance_lasts": lambda trace, robot: [
+        float(not _taken_back(trace, robot)) for _ in _times(trace, robot, "accept")[:1]
+    ],
+    # Time at which the UAV sent the proposal that the gatekeeper first accepted, or first refused, s.
+    "accepted_proposal_time": lambda trace, robot: _sent(trace, robot, "accept"),
+    "refused_proposal_time": lambda trace, robot: _sent(trace, robot, "refuse"),
+    # Positions [x, y] in m at the end of the run, and of the robot's first collision.
+    "final_position": lambda trace, robot: _planar(trace.position(robot)[-1]),
+    "collision_position": lambda trace, robot: [
+        axis for hit in events_of(trace, robot, "collision")[:1] for axis in _planar(hit["position_m"])
+    ],
+}
 
 # By measure, what the reason of a row tells of the run at hand.
 DETAILS: dict[str, Callable[[Trace, str], list[str]]] = {

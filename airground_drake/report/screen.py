@@ -14,7 +14,6 @@ from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
 from airground_drake.report.facts import RunFacts
 from airground_drake.report.model import Claim, Report
-from airground_drake.report.outcomes import Near
 from airground_drake.report.sentences import MARKS, Line, counted, grouped, some, unbroken
 from airground_drake.scenario.schema import Run
 from airground_drake.ugv.reasons import refusal
@@ -226,8 +225,8 @@ def _seeds(report: Report) -> Iterator[Check]:
         says = f"{', '.join(names)}: distances kept in {kept} of {count}, all home in {home}"
         yield Check("Other seeds?", mark, says)
         if kept < count:
-            worst = min((seed for name in names for seed in of_runs[name]), key=lambda seed: Near.of(seed).margin_m)
-            yield Check("Other seeds?", "", f"the worst: {Near.of(worst).line}, run {worst.run}, seed {worst.seed}")
+            worst = min((seed for name in names for seed in of_runs[name]), key=lambda seed: seed.margin_m)
+            yield Check("Other seeds?", "", f"the worst: {worst.line}, run {worst.run}, seed {worst.seed}")
     if of_runs and not any(level > 0.0 for level in noise):
         yield Check("Other seeds?", "none", "without decision noise a seed changes nothing")
 

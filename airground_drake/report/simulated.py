@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
+from airground_drake.base.errors import short
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.check.line import AGREES, NOT_HERE
 from airground_drake.report.after_runs import versions, with_seeds
 from airground_drake.report.difference import Difference, first_difference, first_of
-from airground_drake.report.lines import Line, line_of, print_lines, short
+from airground_drake.report.lines import Line, line_of, print_lines
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, within
 from airground_drake.scenario.load import from_data
@@ -65,7 +66,7 @@ def _line(claim: str, run: str, difference: Difference | None, exactly: str, not
     if difference is None:
         return line_of(claim, run, AGREES, exactly)
     about, theirs, ours = difference
-    text = f"{about or 'it'} is {short(ours)} here, recorded {short(theirs)}{note}"
+    text = f"{about or 'it'} is {short(repr(ours))} here, recorded {short(repr(theirs))}{note}"
     values = {"about": about, "recorded": theirs, "recomputed": ours}
     return line_of(claim, run, NOT_HERE, text, "the same scenario gives the same run") | json.loads(json.dumps(values))
 

@@ -63,10 +63,8 @@ class PairBudget(NamedTuple):
 
 def takes_room(scenario: Scenario) -> bool:
     """Whether any robot is not where the law steers or sees it, so that the law keeps more than is promised."""
-    period_s = scenario.control.period_s
-    return scenario.position_error_m > 0.0 or any(
-        plant_of(robot, period_s).signals for robot in scenario.robots.values()
-    )
+    robots, period_s = scenario.robots.values(), scenario.control.period_s
+    return scenario.position_error_m > 0.0 or any(plant_of(robot, period_s).signals for robot in robots)
 
 
 def budget(scenario: Scenario) -> Iterator[PairBudget]:

@@ -47,19 +47,12 @@ MOST_ROWS = 4_000_000
 
 
 class Limits(NamedTuple):
-    """What a scenario may ask for.
+    """What a scenario may ask for."""
 
-    Attributes:
-        work: steps.
-        memory: bytes.
-        time: wall-clock time for a draw of a campaign, s, as third-party code may never end.
-        plugins: whether the third-party code of a draw may be imported and run.
-    """
-
-    work: float = 1e7
-    memory: float = 8.0 * GIB
-    time: float = 3600.0
-    plugins: bool = False
+    work: float = 1e7  # steps
+    memory: float = 8.0 * GIB  # bytes
+    time: float = 3600.0  # wall-clock time for a draw of a campaign, s, as third-party code may never end
+    plugins: bool = False  # whether the third-party code of a draw may be imported and run
 
 
 DEFAULT_LIMITS = Limits()

@@ -92,7 +92,8 @@ def _object(kind: type, made: Schema) -> Schema:
         if unit := unit_of(field.name):
             says["description"] += f" [{unit}]"
         if field.default_factory is not MISSING:
-            says["default"] = [] if "array" in (says.get("type"), *_types(says)) else {}
+            types = says.get("type"), *(choice.get("type") for choice in says.get("anyOf", ()))
+            says["default"] = [] if "array" in types else {}
     return {
         "type": "object",
         "description": " ".join(made["description"].split()),
@@ -116,11 +117,6 @@ def _words_of(kind: type) -> dict[str, str]:
             ):
                 words[ast.unparse(line.target)] = inspect.cleandoc(str(below.value.value))
     return words
-
-
-def _types(says: Schema) -> list[str]:
-    """The types among which a value may choose."""
-    return [str(choice.get("type")) for choice in says.get("anyOf", ())]
 
 
 def keys_at(whole: Schema, *at: str) -> list[str]:

@@ -5,12 +5,7 @@ from collections.abc import Iterable
 from importlib import import_module
 from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-)
+from pydantic import AfterValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from airground_drake.base.limits import MAX_CORNERS, MAX_NAME, MAX_SEED
@@ -59,10 +54,6 @@ def _place(point: list[float]) -> list[float]:
     return [*point, 0.0] if len(point) == 2 else point
 
 
-def _place_or_none(point: list[float]) -> list[float]:
-    return _place(point) if point else point
-
-
 def _two_or_none(value: list[Any]) -> list[Any]:
     if len(value) not in (0, 2):
         raise refused(value, "2 entries")
@@ -93,7 +84,9 @@ AirPointOrNone = Annotated[
     list[Real], Field(strict=True), ValueRule(_all_or_none, lambda: {"minItems": 0, "maxItems": 3})
 ]
 PlaceOrNone = Annotated[
-    list[Real], Field(strict=True), ValueRule(_place_or_none, lambda: {"minItems": 0, "maxItems": 3})
+    list[Real],
+    Field(strict=True),
+    ValueRule(lambda point: _place(point) if point else point, lambda: {"minItems": 0, "maxItems": 3}),
 ]
 Place = Annotated[list[Real], Field(strict=True), ValueRule(_place, lambda: {"minItems": 2, "maxItems": 3})]
 Corner = Annotated[list[Real], Field(strict=True, min_length=2, max_length=2)]

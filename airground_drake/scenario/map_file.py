@@ -26,28 +26,20 @@ _Share = Annotated[float, wanted("a number from 0 to 1", strict=True, ge=0.0, le
 
 @dataclass(frozen=True, kw_only=True)
 class MapServer:
-    """The keys of a map_server's file. Others are left to others.
-
-    Attributes:
-        image: path of the image, from the file's folder.
-        resolution: side of a cell, m.
-        origin: outer corner of the cell at the lower left, x and y in m; heading of the image, rad.
-        occupied_thresh: probability above which a cell is occupied.
-        free_thresh: probability below which it is free.
-        negate: 1 if white is occupied, not black.
-        mode: how the image is read.
-    """
+    """The keys of a map_server's file. Others are left to others."""
 
     __pydantic_config__: ClassVar = ConfigDict(extra="ignore")
 
+    # Path of the image, from the file's folder.
     image: Annotated[Words, wanted("the path of a PGM, PPM, PNG or BMP file", min_length=1)]
     resolution: Annotated[
         float, wanted("the side of a cell, 0.001 to 1000 m", strict=True, ge=1e-3, le=1e3), BeforeValidator(as_float)
     ]
+    # Outer corner of the cell at the lower left, x and y in m; heading of the image, rad.
     origin: Annotated[list[Real], wanted("3 numbers: [x, y, yaw], m and rad", min_length=3, max_length=3)]
-    occupied_thresh: _Share
-    free_thresh: _Share
-    negate: Annotated[int, wanted("0 or 1", ge=0, le=1)]
+    occupied_thresh: _Share  # probability above which a cell is occupied
+    free_thresh: _Share  # probability below which it is free
+    negate: Annotated[int, wanted("0 or 1", ge=0, le=1)]  # 1 if white is occupied, not black
     mode: Annotated[str, BeforeValidator(lambda given: str(given).lower()), wanted("trinary", pattern="^trinary$")] = (
         "trinary"
     )
@@ -57,17 +49,11 @@ _contents: dict[str, bytes] = {}  # contents of the files of maps, by SHA-256: r
 
 
 class MapFile(NamedTuple):
-    """A map_server's map.
+    """A map_server's map."""
 
-    Attributes:
-        cells: which are occupied, which unknown, (rows, columns), the lowest row first.
-        frame: where they are.
-        contents: content of the YAML file and of its image, by path.
-    """
-
-    cells: Occupancy
-    frame: Frame
-    contents: dict[Path, bytes]
+    cells: Occupancy  # which are occupied, which unknown, (rows, columns), the lowest row first
+    frame: Frame  # where they are
+    contents: dict[Path, bytes]  # content of the YAML file and of its image, by path
 
     def grid(self, *, unknown: bool = True) -> Grid:
         """The map with the unknown cells occupied, or free if `unknown` is false."""
@@ -89,10 +75,7 @@ def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
     content = _content(image, MOST_BYTES, document.where("image"), "image", "a PGM, PPM, PNG or BMP file")
     try:
         cells = occupancy(
-            content,
-            occupied_above=about.occupied_thresh,
-            free_below=about.free_thresh,
-            negate=bool(about.negate),
+            content, occupied_above=about.occupied_thresh, free_below=about.free_thresh, negate=bool(about.negate)
         )
     except ValueError as error:
         fault = Fault(f"{about.image} is {error}")

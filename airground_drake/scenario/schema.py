@@ -415,6 +415,10 @@ class Decision:
     noise_period_s: Positive = 0.025
     """How often noise is drawn."""
 
+    def levels(self, zeta_m: float) -> tuple[float, float, float]:
+        """Threshold and release level, m, and dwell, s; the bare trigger has no release level and no dwell."""
+        return (zeta_m, zeta_m, 0.0) if self.trigger == "bare" else (zeta_m, self.release_m, self.min_inter_event_s)
+
 
 @dataclass(slots=True)
 class Policy:

@@ -7,6 +7,7 @@ the first. Plug-ins that a scenario names are not imported here.
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from fractions import Fraction
 from itertools import combinations, pairwise, starmap
@@ -21,7 +22,7 @@ from airground_drake.base.registry import ARRIVAL, METHODS, MODEL_CLAIMS, ROUTES
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.plants.plant import Setting
-from airground_drake.model.trigger.bayes import COMPUTED
+from airground_drake.model.trigger.bayes import threshold
 from airground_drake.scenario import hints
 from airground_drake.scenario.budget import PairBudget, budget, takes_room
 from airground_drake.scenario.outlines import outlines_of
@@ -355,9 +356,7 @@ def _periods(scenario: Scenario) -> Problems:
 
 def _release(scenario: Scenario) -> Problems:
     decision, rule = scenario.decision, scenario.decision.threshold
-    zeta = rule.zeta_m
-    if rule.rule in COMPUTED:
-        zeta = COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
+    zeta = threshold(**asdict(rule))
     if decision.trigger == "automaton" and not decision.release_m < zeta:
         yield "decision.release_m", decision.release_m, f"less than the {rule.rule} threshold, {zeta:.9g} m"
 
@@ -511,59 +510,27 @@ def _filled(scenario: Scenario) -> str:
     return f" (of whose cells {' and '.join(told)} count as occupied)" if told else ""
 
 
-class _Round(NamedTuple):
-    """A robot: its key in the scenario, its name, its place, m, and its radius, m."""
-
-    key: str
-    name: str
-    point: Vector
-    radius: float
-
-
 def _clearances(scenario: Scenario) -> Problems:
     """No robot may start or end within the safe distance of an obstacle or of another robot."""
-    outlines = {name: outlines_of(scenario, body) for name, body in scenario.barriers.items()}
+    robots, outlines = scenario.robots, {name: outlines_of(scenario, body) for name, body in scenario.barriers.items()}
     for attribute, verb in (("start_m", "starts"), ("target_m", "would end")):
-        ugvs, uavs = (
-            [
-                _Round(scenario.key_of(name), name, getattr(robot, attribute), robot.radius_m)
-                for name, robot in robots.items()
-            ]
-            for robots in (scenario.ugvs, scenario.aerial)
-        )
+        points = {name: getattr(robot, attribute) for name, robot in robots.items()}
+        near = list[tuple[str, str, float, Apart]]()  # a robot, what it is too near to, the gap, m, and what is needed
         for name, rows in outlines.items():
             if scenario.barriers[name].moves or (scenario.barriers[name].appears_s and attribute == "start_m"):
                 continue  # where robots are when it comes or appears is judged in each run
-            kind, least = apart_of(scenario, name)
-            for robot in (*ugvs, *uavs):
-                planar = robot not in uavs
-                apart = convex.distances(rows, np.array(robot.point), planar) - rows[:, outline.RADIUS]
-                gap = float(apart.min()) - robot.radius
-                if gap < least - TOLERANCE:
-                    what = f"{verb} {gap:.9g} m from {name}{_filled(scenario) if name == MAP else ''}"
-                    yield _too_near(robot, attribute, what, kind, least)
-        for robots, others, kind in ((ugvs, ugvs, "ugv_m"), (uavs, ugvs, "air_ground_m"), (uavs, uavs, "uav_m")):
-            least = getattr(scenario.safe_distance, kind)
-            for robot, other in _within(robots, others, least - TOLERANCE):
-                gap = math.dist(robot.point, other.point) - (robot.radius + other.radius)
-                what = f"{verb} {gap:.9g} m from {other.name}"
-                yield _too_near(robot, attribute, what, f"safe_distance.{kind}", least)
-
-
-def _too_near(robot: _Round, attribute: str, what: str, kind: str, least: float) -> tuple[str, object, str]:
-    return f"{robot.key}.{attribute}", robot.point, f"{robot.name} {what}, at least {kind} = {least:.9g} m is needed"
-
-
-def _within(these: Sequence[_Round], those: Sequence[_Round], distance: float) -> Iterator[tuple[_Round, _Round]]:
-    """Pairs whose surfaces are nearer than a distance, m. If both lists are the same, each pair comes once."""
-    (points, radii), (others, other_radii) = (
-        (np.reshape([disc.point for disc in group], (-1, 3)), np.array([disc.radius for disc in group]))
-        for group in (these, those)
-    )
-    apart = np.linalg.norm(points[:, None] - others, axis=2)
-    for i, j in np.argwhere(apart < distance + np.add.outer(radii, other_radii)).tolist():
-        if these is not those or j < i:
-            yield these[i], those[j]
+            needed = apart_of(scenario, name)
+            for robot, point in points.items():
+                apart = convex.distances(rows, np.array(point), robot in scenario.ugvs) - rows[:, outline.RADIUS]
+                near.append((robot, name, float(apart.min()) - robots[robot].radius_m, needed))
+        for other, robot in combinations(robots, 2):
+            gap = math.dist(points[robot], points[other]) - (robots[robot].radius_m + robots[other].radius_m)
+            near.append((robot, other, gap, _apart(scenario, f"{scenario.pair_of(other, robot)}_m")))
+        for robot, other, gap, (kind, least) in near:
+            if gap < least - TOLERANCE:
+                what = f"{verb} {gap:.9g} m from {other}{_filled(scenario) if other == MAP else ''}"
+                allowed = f"{robot} {what}, at least {kind} = {least:.9g} m is needed"
+                yield f"{scenario.key_of(robot)}.{attribute}", points[robot], allowed
 
 
 def _standing(scenario: Scenario) -> Problems:

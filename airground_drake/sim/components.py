@@ -1,6 +1,7 @@
 """Factories: each makes one part of the diagram from a scenario."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import Avoidance, Composition
 from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.model.trigger.automaton import Trigger
-from airground_drake.model.trigger.bayes import COMPUTED
+from airground_drake.model.trigger.bayes import threshold
 from airground_drake.scenario.budget import budget, takes_room
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.links import make_qualities
@@ -208,19 +209,8 @@ def make_gatekeepers(scenario: Scenario, law: UgvLaw) -> Gatekeepers:
     return OutcomeGatekeepers(world, law, presets, make_outlook(scenario), make_patience(scenario), seen)
 
 
-def make_trigger(scenario: Scenario, zeta: float) -> Trigger:
-    """The trigger automaton with threshold zeta, m."""
-    if scenario.decision.trigger == "bare":
-        return Trigger.bare(zeta)
-    return Trigger(zeta, scenario.decision.release_m, scenario.decision.min_inter_event_s)
-
-
-def threshold(scenario: Scenario) -> float:
-    """Decision threshold zeta, m: fixed, the minimiser of the Bayes risk, or the root of (19) as printed."""
-    rule = scenario.decision.threshold
-    if rule.rule in COMPUTED:
-        return COMPUTED[rule.rule](rule.drift_m_s, rule.noise_m_sqrt_s, rule.c1_1_s, rule.c2)
-    return rule.zeta_m
+def make_trigger(scenario: Scenario) -> Trigger:
+    return Trigger(*scenario.decision.levels(threshold(**asdict(scenario.decision.threshold))))
 
 
 def positions(rows: Sequence[Sequence[float]]) -> Array:

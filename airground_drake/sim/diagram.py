@@ -45,6 +45,7 @@ from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvC
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
 from airground_drake.sim.blocks.positions import positions_between
 from airground_drake.sim.blocks.sensing import Errors, PositionSensing
+from airground_drake.sim.blocks.signals import inputs_of, outputs_of
 
 # Exported output ports of the diagram: the signals of a trace.
 RECORDED = (
@@ -143,7 +144,7 @@ def build_model(
         raise PluginError(f"decision_block is {short(repr(decision_block))}; allowed: a subclass of DecisionBlock")
     block = _checked_block(n, decision_block(world, presets))
     shortest = min(scenario.control.period_s, scenario.decision.noise_period_s)
-    trigger = EventTrigger(n, components.make_trigger(scenario, components.threshold(scenario)), shortest)
+    trigger = EventTrigger(n, components.make_trigger(scenario), shortest)
     decision = _decision_making(scenario, n, block, trigger)
     made = {body.name: plant_system(body, scenario.control.period_s, plants) for body in world.moving}
     signals = (*world.signals, *(f"{name}.heading_rad" for name in _own_headings(world, made)))
@@ -161,7 +162,9 @@ def build_model(
             retry=retry if channel else None,
         )  # fmt: skip
     answering = gatekeeper or DirectAcceptance(n, channel_period=period if channel else None)
-    answers = {port.get_name(): port for port in _outputs(answering) if not (channel and port.get_name() == "reports")}
+    answers = {
+        port.get_name(): port for port in outputs_of(answering) if not (channel and port.get_name() == "reports")
+    }
     own = scenario.ugv_controller
     between = positions_between(scenario, world, law)
     ugvs = OwnUgvController(own, world, law, ugv_controller) if own else between.controller
@@ -186,7 +189,7 @@ def build_model(
     parts |= between.parts
     if monitor is not None:
         parts["monitor"] = monitor
-    named = {port.get_name(): port for part in parts.values() for port in _outputs(part)}
+    named = {port.get_name(): port for part in parts.values() for port in outputs_of(part)}
     if isinstance(ugvs, OwnUgvController):
         ugvs.require_inputs(named)
     recorded = (*RECORDED, *(name for name in OF_SOME if name in named))
@@ -321,20 +324,20 @@ def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) ->
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
     builder.ExportOutput(bodies.get_output_port(), "bodies")
     builder.ExportOutput(team_command.get_output_port(), "team_command")
-    signals = [port for plant in plants.values() for port in _outputs(plant) if port.get_name() == "signals"]
+    signals = [port for plant in plants.values() for port in outputs_of(plant) if port.get_name() == "signals"]
     if signals:
-        builder.ExportOutput(_together(builder, "plant_signals", signals), "plant_signals")
+        builder.ExportOutput(together(builder, "plant_signals", signals), "plant_signals")
     if own := _own_headings(world, plants):
-        builder.ExportOutput(_together(builder, "own_headings", [*own.values()]), "own_headings")
+        builder.ExportOutput(together(builder, "own_headings", [*own.values()]), "own_headings")
     if world.steering is not None:
-        of_ugvs = [{port.get_name(): port for port in _outputs(plants[name])} for name in world.names("ugv")]
+        of_ugvs = [{port.get_name(): port for port in outputs_of(plants[name])} for name in world.names("ugv")]
         none = builder.AddNamedSystem("no_heading", ConstantVectorSource([0.0])).get_output_port()
         headings = [ports.get("heading", none) for ports in of_ugvs]
-        builder.ExportOutput(_together(builder, "headings", headings), "headings")
+        builder.ExportOutput(together(builder, "headings", headings), "headings")
     return _built("vehicles", builder)
 
 
-def _together(builder: DiagramBuilder, name: str, ports: Sequence[OutputPort]) -> OutputPort:
+def together(builder: DiagramBuilder, name: str, ports: Sequence[OutputPort]) -> OutputPort:
     """One output port with the values of several."""
     multiplexer = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
     for i, port in enumerate(ports):
@@ -359,7 +362,7 @@ def _assembled(
     for source, target in wires:
         builder.Connect(source, target)
     inputs = set()
-    for port in (system.get_input_port(i) for system in systems.values() for i in range(system.num_input_ports())):
+    for port in (port for system in systems.values() for port in inputs_of(system)):
         wanted = renamed.get(port.get_system(), NO_NAMES).get(port.get_name(), port.get_name())
         if builder.IsConnectedOrExported(port):
             continue
@@ -379,10 +382,6 @@ def _built(name: str, builder: DiagramBuilder) -> Diagram:
     diagram = builder.Build()
     diagram.set_name(name)
     return diagram
-
-
-def _outputs(system: System) -> list[OutputPort]:
-    return [system.get_output_port(i) for i in range(system.num_output_ports())]
 
 
 def make_monitor(
@@ -443,7 +442,7 @@ def _own_headings(world: World, plants: Mapping[str, System]) -> dict[str, Outpu
 def _checked_block(n: int, block: System) -> System:
     if not isinstance(block, System):
         raise PluginError(f"decision_block makes {short(repr(block))}; allowed: a System such as a DecisionBlock")
-    sizes = {port.get_name(): port.size() for port in _outputs(block)}
+    sizes = {port.get_name(): port.size() for port in outputs_of(block)}
     wanted = {"decision_variable": n, "decision_range": 2 * n}
     if any(sizes.get(name) != size for name, size in wanted.items()):
         raise PluginError(f"the decision block has output ports of sizes {sizes}; they must include {wanted}")

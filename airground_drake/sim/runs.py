@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files, interruption
-from airground_drake.base.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described, one_line
+from airground_drake.base.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described
 from airground_drake.base.parallel import forks, processes, processors
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.model.law import kernels
@@ -70,7 +70,7 @@ class _Process:
             raise _noted(files.read_bytes(self._folder / FAILURE), self._what)
         if code or not (self._folder / "meta.json").is_file():
             how = interruption.ended_how(code)
-            raise AirgroundError(one_line(f"{self._what}: the process that simulated it died ({how})"))
+            raise AirgroundError(f"{self._what}: the process that simulated it died ({how})")
         return trace.load(self._folder)
 
 
@@ -177,11 +177,11 @@ def _noted(note: bytes, what: str) -> AirgroundError:
     try:
         failure = json.loads(note)
         if failure["stopped"] is None:
-            return (PluginError if failure["refused"] else AirgroundError)(one_line(str(failure["what"])))
+            return (PluginError if failure["refused"] else AirgroundError)(str(failure["what"]))
         run, t, why = failure["stopped"]
         return SimulationError(str(run), float(t), str(why))
     except (ValueError, KeyError, TypeError, RecursionError):
-        return AirgroundError(one_line(f"{what}: the process that simulated it left no readable note"))
+        return AirgroundError(f"{what}: the process that simulated it left no readable note")
 
 
 def _stop(processes: list[BaseProcess]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, System
-from pydrake.systems.primitives import LogVectorOutput, Multiplexer
+from pydrake.systems.primitives import LogVectorOutput
 
 from airground_drake.base.errors import SimulationError, UnknownNameError, described, raised_as
 from airground_drake.base.registry import UGV_CONTROLLERS
@@ -29,8 +29,9 @@ from airground_drake.sim.blocks.decision import ACCURACY, DecisionVariable
 from airground_drake.sim.blocks.lifetime import untie
 from airground_drake.sim.blocks.own_controller import ControllerFactory
 from airground_drake.sim.blocks.plant import OwnPlant, code_of, declared, own_code
+from airground_drake.sim.blocks.signals import inputs_of
 from airground_drake.sim.components import GatekeepersFactory, make_gatekeepers
-from airground_drake.sim.diagram import NO_PLANTS, DecisionFactory, Model, build_diagram, build_model
+from airground_drake.sim.diagram import NO_PLANTS, DecisionFactory, Model, build_diagram, build_model, together
 from airground_drake.sim.recording import Done, trace_of
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.channel import Transit
@@ -89,13 +90,11 @@ class Recorder:
         builder = DiagramBuilder()
         builder.AddSystem(self.model.diagram)
         ports = [self.model.diagram.GetOutputPort(name) for name in self.model.recorded]
-        together = builder.AddNamedSystem("recorded_signals", Multiplexer([port.size() for port in ports]))
-        for i, port in enumerate(ports):
-            builder.Connect(port, together.get_input_port(i))
-        self._log = LogVectorOutput(together.get_output_port(), builder)  # one for all: a log costs a step 10 us
+        # One log for all: each costs a step 10 us.
+        self._log = LogVectorOutput(together(builder, "recorded_signals", ports), builder)
         for observer in observers:
             builder.AddSystem(observer)
-            for port in (observer.get_input_port(i) for i in range(observer.num_input_ports())):
+            for port in inputs_of(observer):
                 builder.Connect(self.model.diagram.GetOutputPort(port.get_name()), port)
         self._root = builder.Build()
         self._root.set_name("recorded")

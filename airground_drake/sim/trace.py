@@ -55,7 +55,7 @@ import pandas as pd
 
 from airground_drake.base import files
 from airground_drake.base.arrays import Array, Indices, read_only
-from airground_drake.base.errors import TraceError, one_line
+from airground_drake.base.errors import TraceError
 from airground_drake.base.values import NAME_PATTERN
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.plants.plant import Plant
@@ -395,6 +395,6 @@ def load(folder: Path, run: str = "") -> Trace:
             tables[name] = files.read_table(data)
         return Trace(meta, timings=timings, **tables)
     except OSError as error:
-        raise TraceError(one_line(f"{error.filename}: {error.strerror}; wanted: a file of a saved run")) from error
+        raise TraceError(f"{error.filename}: {error.strerror}; wanted: a file of a saved run") from error
     except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise TraceError(one_line(f"{folder}: not a readable trace: {error}")) from error
+        raise TraceError(f"{folder}: not a readable trace: {error}") from error

@@ -5,7 +5,7 @@ The planner calls `plan` for a UGV that needs a proposal, and `after_refusal` wh
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from threading import Lock
 from typing import Any, Literal, get_args
 
@@ -75,34 +75,19 @@ class Asked:
 Candidate = tuple[int, Asked, dict[str, Motion]]  # a plan: its turn, the policy that was asked, and motions by UGV
 
 
+@dataclass(frozen=True, eq=False)
 class BehaviourDatabase:
-    """Policies and the order in which the UAV tries them.
+    """Policies and the order in which the UAV tries them."""
 
-    Attributes:
-        policies: (name, policy) pairs; without any the UAV only supervises.
-        retry: rest after a refusal, or when no policy has a proposal, s. It doubles each time in a row without a
-            proposal.
-        ranking: 'listed' asks the policies in turn. 'predicted' asks all and takes the proposal with the best predicted
-            outcome on the UAV's map; after a refusal it takes the next best.
-        budget: wall-clock time for a policy's proposal, s, unless the policy counts its effort.
-        joint: whether a joint plan takes effect only as a whole. If not, each part is a proposal of its own.
-    """
-
-    def __init__(
-        self,
-        policies: Sequence[tuple[str, Policy]],
-        *,
-        retry: float = 0.0,
-        ranking: Ranking = "listed",
-        budget: float = 2.0,
-        joint: bool = True,
-    ) -> None:
-        self.policies = tuple(policies)
-        self.retry = retry
-        self.ranking = ranking
-        self.budget = budget
-        self.joint = joint
-        self._asking = Lock()
+    policies: Sequence[tuple[str, Policy]]  # by name; without any the UAV only supervises
+    # Rest after a refusal, or when no policy has a proposal, s. It doubles each time in a row without a proposal.
+    retry: float = 0.0
+    # 'listed' asks the policies in turn. 'predicted' asks all and takes the proposal with the best predicted outcome on
+    # the UAV's map; after a refusal it takes the next best.
+    ranking: Ranking = "listed"
+    budget: float = 2.0  # wall-clock time for a policy's proposal, s, unless the policy counts its effort
+    joint: bool = True  # whether a joint plan takes effect only as a whole; if not, each part is a proposal of its own
+    _asking: Any = field(default_factory=Lock, init=False)
 
     def close(self) -> None:
         """End the processes of third-party policies."""

@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,6 +87,19 @@ class Sender(NamedTuple):
 
 
 ONLY = Sender()
+
+
+class Instant(NamedTuple):
+    """What the UAV sees and hears when it plans for n UGVs."""
+
+    t: float  # time, s
+    positions: Array  # of all robots, (r, 3), m
+    intervening: Sequence[bool]  # per UGV, whether it is triggered
+    answers: Array  # (2n,)
+    reports: Reports
+    standing: Sequence[bool] = ()  # per UGV, whether it stands, see `halts`; default: no UGV stands
+    sightings: Sequence[Sighting] = ()  # obstacles that move
+    others: Proposals = ()  # per UGV, what any UAV asks of it; default: there is one UAV
 
 
 def sent_after(before: PlannerState, after: PlannerState, t: float, sender: Sender) -> PlannerState:
@@ -203,62 +217,37 @@ class Planner:
         talks = [Negotiation() if gone else talk for gone, talk in zip(over, memory.talks, strict=True)]
         return replace(memory, talks=tuple(talks)) if any(over) else memory
 
-    def plan(
-        self,
-        memory: PlannerState,
-        t: float,
-        positions: Array,
-        intervening: Sequence[bool],
-        answers: Array,
-        reports: Reports,
-        standing: Sequence[bool] = (),
-        sightings: Sequence[Sighting] = (),
-        others: Proposals = (),
-    ) -> PlannerState:
-        """The memory after one planning period; `t` in s; `positions` of r robots (r, 3), m; `answers` (2n,)."""
-        # standing: per UGV, whether it stands, see `halts`; default: no UGV stands.
-        # others: per UGV, what any UAV asks of it; default: there is one UAV.
-        said = [answer_to(talk.proposal, answers, i) for i, talk in enumerate(memory.talks)]
-        heard = [report for report, answer in zip(reports, said, strict=True) if answer != SILENT]
+    def plan(self, memory: PlannerState, now: Instant) -> PlannerState:
+        """The memory after one planning period."""
+        said = [answer_to(talk.proposal, now.answers, i) for i, talk in enumerate(memory.talks)]
+        heard = [report for report, answer in zip(now.reports, said, strict=True) if answer != SILENT]
         unknown = {row for report in heard for row in report.sensed} - set(memory.learnt)
         fresh: tuple[Outline, ...] = ()
         if unknown:
-            there = self._there(t)
+            there = self._there(now.t)
             fresh = tuple(sorted((row for row in unknown if not self._is_on_map(row, there)), key=_place))
-        talks = self._after_answers(memory.talks, t, positions, intervening, said, reports, learnt=bool(fresh))
+        talks = self._after_answers(memory.talks, now, said, learnt=bool(fresh))
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen} | {
-            sighting.name: (sighting, t) for report in heard for sighting in report.seen
+            sighting.name: (sighting, now.t) for report in heard for sighting in report.seen
         }
         memory = replace(
             memory,
             talks=tuple(talks),
             learnt=memory.learnt + fresh,
-            read=(*memory.read, *((report.number, t) for report in heard if report.number > newest)),
+            read=(*memory.read, *((report.number, now.t) for report in heard if report.number > newest)),
             seen=tuple(latest.values()),
         )
-        if not any(called and talk.is_due(t) for called, talk in zip(self._own(intervening), talks, strict=True)):
-            return memory
-        return self._asked(memory, t, positions, intervening, answers, standing, sightings, others)
+        own = self._own(now.intervening)
+        return self._asked(memory, now, own) if any(talk.is_due(now.t) for talk in compress(talks, own)) else memory
 
-    def _asked(
-        self,
-        memory: PlannerState,
-        t: float,
-        positions: Array,
-        intervening: Sequence[bool],
-        answers: Array,
-        standing: Sequence[bool],
-        sightings: Sequence[Sighting],
-        others: Proposals,
-    ) -> PlannerState:
-        """The memory after the policies were asked for all triggered UGVs that need a proposal."""
-        mapped = self.mapped[self._there(t)]
+    def _asked(self, memory: PlannerState, now: Instant, own: Sequence[bool]) -> PlannerState:
+        """The memory after the policies were asked for all its own UGVs that need a proposal."""
+        t, mapped = now.t, self.mapped[self._there(now.t)]
         obstacles = outline.joined(mapped, outline.stacked(memory.learnt)) if memory.learnt else mapped
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen}
-        moving = self._moving(t, {sighting.name: sighting for sighting in sightings}, latest)
+        moving = self._moving(t, {sighting.name: sighting for sighting in now.sightings}, latest)
         talks, asked, memories = list(memory.talks), list(memory.asked), dict(enumerate(memory.memories))
-        own = self._own(intervening)
         for i, robot in enumerate(self.ugvs):
             if not (own[i] and talks[i].is_due(t)):
                 continue
@@ -266,14 +255,14 @@ class Planner:
                 t=t,
                 start=t + self.period + self.lead,
                 robot=robot,
-                position=positions[i],
+                position=now.positions[i],
                 target=self.targets[i],
                 preset=self.presets[i],
                 obstacles=obstacles,
                 mapped=mapped,
-                others=np.delete(positions, i, axis=0),
+                others=np.delete(now.positions, i, axis=0),
                 refusals=talks[i].refusals,
-                team=self._team(t, positions, intervening, answers, talks, standing, others),
+                team=self._team(now, talks),
                 robot_distance=self.robot_distance,
                 radius=float(self.radii[i]),
                 moving=moving,
@@ -304,21 +293,13 @@ class Planner:
         return tuple(bodies)
 
     def _after_answers(
-        self,
-        talks: Sequence[Negotiation],
-        t: float,
-        positions: Array,
-        intervening: Sequence[bool],
-        said: Sequence[float],
-        reports: Reports,
-        *,
-        learnt: bool,
+        self, talks: Sequence[Negotiation], now: Instant, said: Sequence[float], *, learnt: bool
     ) -> list[Negotiation]:
         # A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
         # its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
         # trajectory goes on: the others' ways were planned with it. Those that did not refuse are asked again at once.
         # If a UGV that may fall behind would have stalled, or was left behind, its motion was too fast.
-        called = {name for name, active in zip(self.ugvs, intervening, strict=True) if active}
+        t, called = now.t, set(compress(self.ugvs, now.intervening))
         refused = {talk.proposal.joint for talk, a in zip(talks, said, strict=True) if talk.proposal and a == REFUSE}
         after = []
         for i, (name, talk, answer) in enumerate(zip(self.ugvs, talks, said, strict=True)):
@@ -329,13 +310,13 @@ class Planner:
                 talk = Negotiation()
             elif answer == REFUSE:
                 talk = self.database.after_refusal(
-                    talk, t, learnt=learnt, too_fast=trails and reports[i].reason == STALLS
+                    talk, t, learnt=learnt, too_fast=trails and now.reports[i].reason == STALLS
                 )
             elif proposal is not None and (party_refused or answer == DONE or t >= proposal.motion.end):
-                off = np.linalg.norm(positions[i] - proposal.motion.positions[-1]) if t >= proposal.motion.end else 0.0
-                behind = trails and bool(off > BEHIND_S * self.max_speed[i])
+                left_m = np.linalg.norm(now.positions[i] - proposal.motion.positions[-1])
+                behind = trails and t >= proposal.motion.end and bool(left_m > BEHIND_S * self.max_speed[i])
                 talk = replace(talk, proposal=None, too_fast=talk.too_fast + behind)
-            elif answer == SILENT and proposal is not None and self._is_late(proposal, name, t, positions[i]):
+            elif answer == SILENT and proposal is not None and self._is_late(proposal, name, t, now.positions[i]):
                 talk = replace(talk, proposal=None)
             after.append(talk)
         return after
@@ -352,33 +333,24 @@ class Planner:
         nearer = np.linalg.norm(place - first) < np.linalg.norm(place - now)
         return bool(nearer) and leaves + self.lead > began + LATE_S + SAME_S
 
-    def _team(
-        self,
-        t: float,
-        positions: Array,
-        intervening: Sequence[bool],
-        answers: Array,
-        talks: Sequence[Negotiation],
-        standing: Sequence[bool],
-        others: Proposals,
-    ) -> tuple[Teammate, ...]:
-        """All UGVs as the UAV sees them at time t, s."""
+    def _team(self, now: Instant, talks: Sequence[Negotiation]) -> tuple[Teammate, ...]:
+        """All UGVs as the UAV sees them."""
         charge = self.charge or (True,) * len(self.ugvs)
-        asked = [talk.proposal if charge[i] else others[i] for i, talk in enumerate(talks)]
+        asked = [talk.proposal if charge[i] else now.others[i] for i, talk in enumerate(talks)]
         return tuple(
             Teammate(
                 name=name,
-                position=positions[i],
+                position=now.positions[i],
                 target=self.targets[i],
                 preset=self.presets[i],
                 max_speed=float(self.max_speed[i]),
-                triggered=bool(intervening[i]),
-                standing=standing[i] if standing else False,
+                triggered=bool(now.intervening[i]),
+                standing=now.standing[i] if now.standing else False,
                 proposal=asked[i],
-                answered=_WORDS.get(answer_to(asked[i], answers, i), "silent"),
+                answered=_WORDS.get(answer_to(asked[i], now.answers, i), "silent"),
                 refusals=talks[i].refusals,
                 too_fast=talks[i].too_fast,
-                resting=talks[i].refused_lately(t),
+                resting=talks[i].refused_lately(now.t),
                 radius=float(self.radii[i]),
                 in_charge=charge[i],
             )

@@ -26,9 +26,8 @@ class Desk(Immutable):
     held: Proposals  # the proposals in force, one entry per UGV
     newest: tuple[int, ...]  # the highest number of a proposal that each has read of, (n,)
     last: tuple[Message | None, ...]  # the last answer of each
-    read_s: History[float] = field(
-        default_factory=History
-    )  # when each message that arrived was read, s, in the order of arrival
+    # When each message that arrived was read, s, in the order of arrival.
+    read_s: History[float] = field(default_factory=History)
     outbox: History[Message] = field(default_factory=History)  # all answers
 
     @classmethod

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airground_drake.base.arrays import Array, Flags, Indices
-from airground_drake.base.errors import PluginError, described, one_line, raised_as, short
+from airground_drake.base.errors import PluginError, described, raised_as, short
 from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import convex, outline
@@ -80,11 +80,7 @@ class Inputs:
 
 
 class Gatekeepers(abc.ABC):
-    """The UGVs of a team, as they judge proposals.
-
-    Attributes:
-        law: their control law, with the scenario's gains.
-    """
+    """The UGVs of a team, as they judge proposals, and the control law that they have, with the scenario's gains."""
 
     def __init__(
         self, world: World, law: UgvLaw, presets: Sequence[Motion], unreported: Collection[str] = frozenset()
@@ -274,7 +270,7 @@ class PaperGatekeepers(Gatekeepers):
         if not isinstance(solution, Solution):
             returned = f"{short(repr(solution))}, of type {type(solution).__qualname__}"
             allowed = f"{Solution.__module__}.{Solution.__qualname__}"
-            raise PluginError(one_line(f"route {kind.__qualname__} returned {returned}; allowed: {allowed}"))
+            raise PluginError(f"route {kind.__qualname__} returned {returned}; allowed: {allowed}")
         return solution
 
 

@@ -28,14 +28,7 @@ from airground_drake.model.geometry.convex import news_within, within
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.model.plants.scripted import Scripted
-from airground_drake.uav.messages import (
-    ACCEPT,
-    DONE,
-    REFUSE,
-    SILENT,
-    Proposals,
-    answer_to,
-)
+from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, SILENT, Proposals, answer_to
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import Basis, GatekeeperDecision
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs

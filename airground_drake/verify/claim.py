@@ -21,15 +21,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.finding import Chart, Failure, Finding
 
-__all__ = [
-    "Claim",
-    "Finding",
-    "ModelClaim",
-    "TraceClaim",
-    "Verdict",
-    "require_motion",
-    "require_whole_run",
-]
+__all__ = ["Claim", "Finding", "ModelClaim", "TraceClaim", "Verdict", "require_motion", "require_whole_run"]
 
 # A row may differ by this from the position that its command leads to, m. Integrating one step in floating point errs
 # by 1e-15 m.

@@ -10,7 +10,7 @@ from typing import TypeVar, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from airground_drake.base.errors import PluginError, UnknownNameError, one_line, short
+from airground_drake.base.errors import PluginError, UnknownNameError, short
 from airground_drake.base.registry import MODEL_CLAIMS, RUN_CLAIMS, Registry
 from airground_drake.verify.claim import Claim, ModelClaim, TraceClaim
 
@@ -44,7 +44,7 @@ def _made(registry: Registry, kind: type[C], ids: Collection[str] | None, added:
 def _instance(registry: Registry, kind: type[C], name: str, place: str) -> C:
     claim = registry.make(place, of=kind)
     if why := _unsaid(claim):
-        raise PluginError(one_line(f"claim {name!r}: {place} {why}"))
+        raise PluginError(f"claim {name!r}: {place} {why}")
     if claim.id != name:
         raise PluginError(f"claim {name!r}: {place} has the identifier {claim.id!r}")
     return claim

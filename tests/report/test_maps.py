@@ -54,10 +54,10 @@ def in_the_map(trace: Trace, place: list[float]) -> float:
 
 def test_a_report_names_the_place_of_the_map_that_was_nearest(trace: Trace) -> None:
     made, row = screen_of(trace)
-    (near,) = (each for each in RunFacts(made, "a").near if {each.robot, each.other} == {"ugv1", "map"})
+    (near,) = (each for each in RunFacts(made, "a").near if {each.first, each.second} == {"ugv1", "map"})
     assert near.at_m
     robot = [np.interp(near.t_s, trace.t, trace.column(f"ugv1.{axis}_m")) for axis in "xy"]
-    assert math.dist(robot, near.at_m) == pytest.approx(near.value_m, abs=1e-9)
+    assert math.dist(robot, near.at_m) == pytest.approx(near.value, abs=1e-9)
     assert in_the_map(trace, near.at_m) <= 1e-9
     place = f"the map at ({near.at_m[0]:.2f}, {near.at_m[1]:.2f})"
     assert row.safe.lines[1].startswith(f"ugv1\N{EN DASH}{place} 0.100 ≥ 0.1 m at")

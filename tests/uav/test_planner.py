@@ -10,14 +10,13 @@ from oracles import faults_of
 from verify.judging import decided
 
 from airground_drake import load, simulate
-from airground_drake.base.arrays import Array
 from airground_drake.base.registry import METHODS
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.geometry.outline import as_tuple, balls, stacked
 from airground_drake.sim.components import make_planner
 from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, SILENT, Report, accepted_proposals, answer_to
-from airground_drake.uav.planner import Planner, PlannerState, Sender, sent_after
+from airground_drake.uav.planner import Instant, Planner, PlannerState, Sender, sent_after
 from airground_drake.uav.policy import Observation, Policy
 
 PLACES = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, 3.0]])
@@ -60,7 +59,7 @@ def step(
         number = talk.proposal.number if talk.proposal else -1
         given += [(answers or {}).get(name, SILENT), number]
     called = [name in intervening.split() for name in UGVS]
-    return sent_after(memory, uav.plan(memory, t, PLACES, called, np.array(given), reports), t, uav.sender)
+    return sent_after(memory, uav.plan(memory, Instant(t, PLACES, called, np.array(given), reports)), t, uav.sender)
 
 
 def in_force(memory: PlannerState) -> dict[str, tuple[float, str]]:
@@ -149,7 +148,7 @@ def test_a_proposal_that_its_ugv_missed_is_planned_anew(t: float, place: float, 
     memory = step(uav, uav.start(), 1.0, "one")
     at = PLACES + np.array([[place, 0.0, 0.0], *np.zeros((3, 3))])
     answers = np.array([answer, 0.0, *[SILENT, -1.0] * 2])
-    after = sent_after(memory, uav.plan(memory, t, at, [True, False, False], answers, NOBODY), t, uav.sender)
+    after = sent_after(memory, uav.plan(memory, Instant(t, at, [True, False, False], answers, NOBODY)), t, uav.sender)
     assert [proposal.issued for _, proposal in after.sent] == [1.0, *([t] if anew else [])]
 
 
@@ -208,11 +207,11 @@ def test_numbers_are_unique_over_uavs_and_say_who_sent_them() -> None:
 def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """Though the planner changes an accepted motion, under the same number and time of issue."""
 
-    def swapping(self: Planner, memory: PlannerState, t: float, positions: Array, *given: Any) -> PlannerState:
-        planned = honest(self, memory, t, positions, *given)
+    def swapping(self: Planner, memory: PlannerState, now: Instant) -> PlannerState:
+        planned = honest(self, memory, now)
         talks = list(planned.talks)
         for i, talk in enumerate(talks):
-            if talk.proposal is not None and answer_to(talk.proposal, given[1], i) == ACCEPT:
+            if talk.proposal is not None and answer_to(talk.proposal, now.answers, i) == ACCEPT:
                 motion = Motion(talk.proposal.motion.times, talk.proposal.motion.positions + np.array([0.0, 0.2, 0.0]))
                 talks[i] = replace(talk, proposal=replace(talk.proposal, motion=motion))
         return replace(planned, talks=tuple(talks))
@@ -301,7 +300,7 @@ def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
     known, unknown = map(as_tuple, balls([[2.0, 9.0, 0.0], [5.0, 5.0, 0.0]], [3.0, 0.7], 1.0))
     sensed = Report(sensed=(known, unknown))
     answers = np.array([REFUSE, 0.0, SILENT, -1.0, SILENT, -1.0])
-    memory = uav.plan(memory, 1.1, PLACES, [True, False, False], answers, (sensed, *NOBODY[1:]))
+    memory = uav.plan(memory, Instant(1.1, PLACES, [True, False, False], answers, (sensed, *NOBODY[1:])))
     assert memory.learnt == (unknown,)  # the other one is on the map
     memory = step(uav, memory, 3.0, "one")
     first, second = policy.seen
@@ -320,7 +319,7 @@ def test_a_policy_sees_each_robot_as_it_is() -> None:
     uav = replace(planner(policy), max_speed=np.array([1.0, 2.0, 3.0]))
     moved = PLACES + np.array([[0.0], [1.0], [0.0], [0.0]])
     standing = [True, False, True]
-    uav.plan(uav.start(), 1.0, moved, [True, True, True], np.array([SILENT, -1.0] * 3), NOBODY, standing)
+    uav.plan(uav.start(), Instant(1.0, moved, [True] * 3, np.array([SILENT, -1.0] * 3), NOBODY, standing))
     assert [seen.robot for seen in policy.seen] == list(UGVS)
     for i, seen in enumerate(policy.seen):
         np.testing.assert_array_equal(seen.position, moved[i])

@@ -233,12 +233,9 @@ class _Obstacles:
             return None
         k = int(inside[0])
         middle, keep = _show(complex(*self.rows[k, MIDDLE:EXTENT])), self.keep[k]
-        is_disc = k < self.first
-        return (
-            f"the disc at {middle}, radius {keep}"
-            if is_disc
-            else f"the obstacle about {middle}, with {keep} m round it"
-        )
+        if k < self.first:
+            return f"the disc at {middle}, radius {keep}"
+        return f"the obstacle about {middle}, with {keep} m round it"
 
     def distances(self, point: complex) -> Array:
         """Signed distances of a point from the cores, (m,), m."""

@@ -56,6 +56,11 @@ def printed_threshold(drift: float, noise: float, c1: float, c2: float) -> float
 COMPUTED = {"bayes": optimal_threshold, "printed": printed_threshold}
 
 
+def threshold(rule: str, zeta_m: float, c1_1_s: float, c2: float, drift_m_s: float, noise_m_sqrt_s: float) -> float:
+    """The threshold by a rule of a scenario, m: the fixed one, or what the rule computes."""
+    return COMPUTED[rule](drift_m_s, noise_m_sqrt_s, c1_1_s, c2) if rule in COMPUTED else zeta_m
+
+
 def _bias(zeta: float, drift: float, noise: float, deviation: float) -> float:
     """(1 - exp(-2 y0 a / s^2)) / (2 sinh(2 zeta a / s^2)), so that nothing overflows, and small y0 do not cancel."""
     u = 2.0 * zeta * drift / noise**2

@@ -101,7 +101,7 @@ def _soft_gate() -> Item:
             "least_predicted_clearance_of_accepted_m": (
                 float(accepted.min()) if len(accepted) and name in ("c", LIGHT) else None
             ),
-            "min_distance_m": nearest.value_m if nearest else None,
+            "min_distance_m": nearest.value if nearest else None,
             "t_s": nearest.t_s if nearest else None,
         }
     paper, ours = evidence["c"], evidence[EVERYTHING]
@@ -183,7 +183,7 @@ def _method_b(direct: Trace, gated: Trace) -> Item:
     """Item 23: method (b) with a gatekeeper, as in section 5.1, is method (c)."""
     answer, traces = gated.decisions.iloc[0], {"without": direct, "with": gated}
     nearest = {name: closest_obstacle(trace, "ugv1") for name, trace in traces.items()}
-    least = {name: round(closest.value_m, 9) if closest else None for name, closest in nearest.items()}
+    least = {name: round(closest.value, 9) if closest else None for name, closest in nearest.items()}
     triggers = {name: MEASURES["trigger_time"](trace, "ugv1") for name, trace in traces.items()}
     return item(
         23, "section 5, Figures 6 and 10",

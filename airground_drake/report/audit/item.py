@@ -123,10 +123,7 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (r"v = \operatorname{avoid}(v_{int} + (I - J_{int}^+ J_{int}) v_{\text{own}}) \quad \text{(method (d))}",),
     ),
     18: (
-        (
-            r"T = \frac{\zeta}{\mu} \tanh \frac{\zeta \mu}{\sigma^2}",
-            r"E = \frac{1}{1 + e^{2 \zeta \mu / \sigma^2}}",
-        ),
+        (r"T = \frac{\zeta}{\mu} \tanh \frac{\zeta \mu}{\sigma^2}", r"E = \frac{1}{1 + e^{2 \zeta \mu / \sigma^2}}"),
         (r"T = \frac{\zeta}{\mu} \quad \text{(one threshold, } \mu > 0 \text{)}", r"E = 0"),
     ),
     19: (

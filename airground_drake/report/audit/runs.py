@@ -36,14 +36,14 @@ def _recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
         nearest_of = [near for robot in trace.ugvs if (near := closest_obstacle(trace, robot))]
         if not nearest_of:
             return None
-        nearest = min(nearest_of, key=lambda near: (near.value_m, near.t_s))
+        nearest = min(nearest_of, key=lambda near: (near.value, near.t_s))
         evidence[name] = {
             "composition": scenario.runs[name].composition,
-            "robot": nearest.robot,
-            "obstacle": nearest.other,
-            "min_distance_m": nearest.value_m,
+            "robot": nearest.first,
+            "obstacle": nearest.second,
+            "min_distance_m": nearest.value,
             "t_s": nearest.t_s,
-            "margin_m": nearest.value_m - d,
+            "margin_m": nearest.value - d,
             "stalls_m": {ugv: at for ugv in trace.ugvs if (at := MEASURES["stall_position"](trace, ugv))},
         }
     theirs, ours = ([evidence[name] for name in compared if (name in printed) == own] for own in (True, False))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from airground_drake.base.errors import TraceError, one_line
+from airground_drake.base.errors import TraceError
 from airground_drake.base.registry import method_of
 from airground_drake.report.figures import findings, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
@@ -67,7 +67,7 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
     for trace in traces.values():
         if trace.robots != (known := [*trace.scenario.robots]):
             wrong = f"its robots are {', '.join(trace.robots)}; those of its scenario: {', '.join(known)}"
-            raise TraceError(one_line(f"run {trace.run}: {wrong}"))
+            raise TraceError(f"run {trace.run}: {wrong}")
     numbers = next((paper for name, paper in _PAPER.items() if scenario.name.startswith(name)), ())
     with canvas.style(settings):
         chosen = _select(scenario, traces)
@@ -75,13 +75,9 @@ def draw(scenario: Scenario, traces: Mapping[str, Trace], settings: Mapping[str,
         drawn += [_team(chosen)] if len(chosen.first.ugvs) > MAX_TEAM else []
         compared = findings.recursion(scenario, traces)
     counterpart = dict(zip(_NUMBERED, numbers, strict=False))
-    return [
-        replace(figure, title=f"{figure.title} (the paper's {counterpart[figure.id]})")
-        if figure.id in counterpart
-        else figure
-        for figure in [*drawn, compared]
-        if figure is not None
-    ]
+    figures = [figure for figure in [*drawn, compared] if figure is not None]
+    ours = {figure.id: f" (the paper's {counterpart[figure.id]})" for figure in figures if figure.id in counterpart}
+    return [replace(figure, title=f"{figure.title}{ours.get(figure.id, '')}") for figure in figures]
 
 
 def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
@@ -189,20 +185,20 @@ def _points(trace: Trace, robots: list[str], marks: Sequence[maps.Mark]) -> Tabl
 
 def _distances(chosen: _Selection) -> Figure | None:
     near = {(heading, ugv): close_by(trace, ugv) for heading, trace in chosen.shown.items() for ugv in chosen.ugvs}
-    most = max((at.required_m for those in near.values() for at in those), default=None)
+    most = max((at.safe_distance_m for those in near.values() for at in those), default=None)
     if most is None:
         return None
-    near = {key: [at for at in those if at is those[0] or at.value_m < NEAR * most] for key, those in near.items()}
+    near = {key: [at for at in those if at is those[0] or at.value < NEAR * most] for key, those in near.items()}
     top = FARTHEST * most
     world = [*chosen.first.scenario.barriers, *chosen.first.robots]
-    met = {ugv: {at.other for (_, robot), those in near.items() if robot == ugv for at in those} for ugv in chosen.ugvs}
+    met = {ugv: {at.second for those in near.values() for at in those if at.first == ugv} for ugv in chosen.ugvs}
     looks = {ugv: {other: k for k, other in enumerate(filter(met[ugv].__contains__, world))} for ugv in chosen.ugvs}
     half = (len(chosen.ugvs) + 1) // 2  # a single run takes both columns of the page
     columns = [chosen.ugvs] if len(chosen.shown) > 1 else [chosen.ugvs[:half], chosen.ugvs[half:]]
     panels = list[Panel]()
     for heading, trace, ugvs in [(*run, ugvs) for run in chosen.shown.items() for ugvs in columns if ugvs]:
         of_ugvs = {ugv: near[heading, ugv] for ugv in ugvs}
-        gaps = {f"{ugv} to {at.other}": gap_m(trace, ugv, at.other) for ugv, those in of_ugvs.items() for at in those}
+        gaps = {f"{ugv} to {at.second}": gap_m(trace, ugv, at.second) for ugv, those in of_ugvs.items() for at in those}
         smallest = "; ".join(
             f"{ugv} {those[0]} to {those[0].whom} at {those[0].t_s:.2f} s" for ugv, those in of_ugvs.items() if those
         )
@@ -215,7 +211,7 @@ def _distances(chosen: _Selection) -> Figure | None:
     at, ugv, heading = min(pairs, key=lambda pair: pair[0].margin_m)
     least = "Too close" if at.is_short else "Closest"
     least += f": {ugv} is {at} from {at.whom} at {at.t_s:.2f} s"
-    least += f", {at.required_m:g} m required"
+    least += f", {at.safe_distance_m:g} m required"
     caption = (
         f"{least} ({_runs(heading).lower()}). No line may enter the hatched band. "
         f"Circle: the smallest distance, exact; red: too small.{_left_out(chosen, chosen.ugvs)}"
@@ -278,9 +274,7 @@ def _team(chosen: _Selection) -> Figure:
             if values
         )
         table = Table(f"{what}, over the UGVs", ("run", "UGVs", "least", "median", "largest"), rows)
-        says = "; ".join(
-            f"run {name}: {least} to {largest}, median {middle}" for name, _, least, middle, largest in rows
-        )
+        says = "; ".join(f"run {run}: {least} to {largest}, median {middle}" for run, _, least, middle, largest in rows)
         drawing, heading = timelines.histogram(what, of_runs), f"UGVs by {what.partition(',')[0]}"
         panels.append(panel(drawing, f"team-{position}", f"UGVs by {what}", says, heading, table))
     there = []

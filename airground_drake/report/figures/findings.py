@@ -9,7 +9,7 @@ from matplotlib.figure import Figure as Drawing
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.trigger.bayes import decision_time, optimal_threshold
-from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, panel
+from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, panel, spread
 from airground_drake.report.figures.timelines import nearest_distance
 from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.view import canvas
@@ -37,14 +37,14 @@ def recursion(scenario: Scenario, traces: Mapping[str, Trace]) -> Figure | None:
     least = [near for trace in runs.values() for ugv in trace.ugvs if (near := closest_obstacle(trace, ugv))]
     if not (printed and augmented and least):
         return None
-    robot = min(least, key=lambda near: near.value_m).robot
+    robot = min(least, key=lambda near: near.value).first
     lines, marks = {}, {}
     for name, trace in runs.items():
         how = f"{name}: {scenario.runs[name].composition.replace('_', ' ')}"
         lines[how] = trace.t, nearest_distance(trace, robot)
         if near := closest_obstacle(trace, robot):
-            lines["safe distance"] = np.array([0.0, trace.t[-1]]), np.full(2, near.required_m)
-            marks[f"closest, {name}"] = near.t_s, near.value_m
+            lines["safe distance"] = np.array([0.0, trace.t[-1]]), np.full(2, near.safe_distance_m)
+            marks[f"closest, {name}"] = near.t_s, near.value
     title = f"Distance of {robot} to the nearest obstacle"
     return of_finding(Chart(title, "time, s", "distance, m", lines, marks), 1)
 
@@ -189,8 +189,7 @@ def of_chart(chart: Chart, name: str, heading: str, beside: str) -> Figure:
     text = f"Up: {chart.y}. Across: {chart.x}. {_marked(chart)}".rstrip()
     rows = []
     for line, (x, y) in chart.lines.items():
-        chosen = np.unique(np.linspace(0, len(x) - 1, MAX_TABLE_ROWS // len(chart.lines)).round().astype(int))
-        rows += [(line, f"{x[k]:.4g}", f"{y[k]:.4g}") for k in chosen]
+        rows += [(line, f"{x[k]:.4g}", f"{y[k]:.4g}") for k in spread(len(x), MAX_TABLE_ROWS // len(chart.lines))]
     rows += [(mark, f"{x:.4g}", f"{y:.4g}") for mark, (x, y) in chart.marks.items()]
     table = Table(f"{chart.title}, some of its points", ("line", chart.x, chart.y), tuple(rows))
     drawn = panel(_drawing(chart), name, chart.title, text, heading, table)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from matplotlib.figure import Figure as Drawing
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Indices
 from airground_drake.report.view import canvas, svg
 from airground_drake.sim.trace import Trace
 
@@ -53,9 +53,14 @@ def panel(drawing: Drawing, name: str, title: str, says: str, heading: str, tabl
     return Panel(heading, svg.inline(canvas.svg(drawing), name, title, says), table, drawing)
 
 
+def spread(count: int, most: int = MAX_TABLE_ROWS) -> Indices:
+    """At most so many of `count` rows, evenly spread, the ends among them."""
+    return np.unique(np.linspace(0, count - 1, most).round().astype(np.intp))
+
+
 def series(trace: Trace, caption: str, columns: Mapping[str, Array]) -> Table:
     """A few dozen rows of columns (T,), evenly spread over the run; a cell is empty where there is no value."""
-    rows = np.unique(np.linspace(0, len(trace.t) - 1, MAX_TABLE_ROWS).round().astype(int))
+    rows = spread(len(trace.t))
     cells = tuple(
         (f"{trace.t[k]:.2f}", *("" if np.isnan(values[k]) else f"{values[k]:.3f}" for values in columns.values()))
         for k in rows

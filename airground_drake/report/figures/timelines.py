@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 
 from airground_drake.base.arrays import Array, Flags
 from airground_drake.report.metrics import events_of, gap_m
-from airground_drake.report.outcomes import Near, metres
+from airground_drake.report.model import Approach
+from airground_drake.report.outcomes import metres
 from airground_drake.report.view import canvas
 from airground_drake.report.view.canvas import ticks_of
 from airground_drake.report.view.labels import BOX
@@ -89,29 +90,26 @@ TOGETHER_S = 0.2  # events that follow each other within this time share a label
 _LEFT_IN, _RIGHT_IN, _ROW_IN, _LINE_IN, _CHAR_IN = 0.55, 1.05, 0.75, 0.15, 0.066
 _COLORS = {"accept": canvas.GOOD, "refuse": canvas.ALARM, "release": canvas.MUTED, "over": canvas.MUTED}
 # Look of the band below the safe distance.
-_FORBIDDEN: dict[str, Any] = {
-    "facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0,
-}  # fmt: skip
 
 
 def distances(
-    trace: Trace, near: Mapping[str, Sequence[Near]], looks: Mapping[str, Mapping[str, int]], top: float
+    trace: Trace, near: Mapping[str, Sequence[Approach]], looks: Mapping[str, Mapping[str, int]], top: float
 ) -> Figure:
     """Distances between the surfaces of each UGV and bodies near it, the required ones, and the exact minimum."""
     figure, every = _time_axes(1.45, [0.24, *[0.32] * (len(near) - 1)], trace)
-    required = sorted({at.required_m for those in near.values() for at in those})
+    required = sorted({at.safe_distance_m for those in near.values() for at in those})
     for axes, (ugv, those) in zip(every, near.items(), strict=True):
-        bottom = min(0.0, *(at.value_m for at in those)) if those else 0.0
-        axes.axhspan(bottom, required[0], **_FORBIDDEN)
+        bottom = min(0.0, *(at.value for at in those)) if those else 0.0
+        axes.axhspan(bottom, required[0], **canvas.FORBIDDEN)
         labels = [(d, f"required {d:.3g}", canvas.INK) for d in required]
         for d in required:
             canvas.level(axes, d, "-")
         highest = required[-1]
         for at in those:
-            gap = gap_m(trace, ugv, at.other)
-            appearance = canvas.look(looks[ugv][at.other])
+            gap = gap_m(trace, ugv, at.second)
+            appearance = canvas.look(looks[ugv][at.second])
             canvas.time_line(axes, trace.t, gap, appearance)
-            labels.append((min(float(gap[-1]), top), canvas.short(at.other, 12), appearance.color))
+            labels.append((min(float(gap[-1]), top), canvas.short(at.second, 12), appearance.color))
             highest = max(highest, float(np.nanmax(gap)))
         axes.set_ylim(bottom, min(1.05 * highest, top))
         canvas.rule(axes, "time, s" if axes is every[-1] else "", "distance, m")
@@ -122,12 +120,12 @@ def distances(
         least = those[0]
         below = least.is_short
         axes.plot(
-            least.t_s, least.value_m, marker="o", markersize=9, markerfacecolor="none", markeredgewidth=1.6,
+            least.t_s, least.value, marker="o", markersize=9, markerfacecolor="none", markeredgewidth=1.6,
             color=canvas.ALARM if below else canvas.INK, zorder=5, clip_on=False,
         )  # fmt: skip
-        value = metres(least.value_m, least.required_m)
-        value = f"{value}, not {least.required_m:g} m," if below else value
-        note = f"{canvas.short(ugv, 14)}: {value} from {canvas.short(least.other, 14)} at {least.t_s:.2f} s"
+        value = metres(least.value, least.safe_distance_m)
+        value = f"{value}, not {least.safe_distance_m:g} m," if below else value
+        note = f"{canvas.short(ugv, 14)}: {value} from {canvas.short(least.second, 14)} at {least.t_s:.2f} s"
         axes.set_title(note, color=canvas.ALARM if below else canvas.INK)
     return figure
 

@@ -26,6 +26,8 @@ _POINTS_PER_INCH = 72.0
 _FONT_PT = 9.0
 _GRID: Any = {"color": "#dddddd", "linewidth": 0.6, "zorder": 0.5}
 _NUMBERS: Any = {"fontsize": 8.5}
+# The look of a band that distances must not enter.
+FORBIDDEN: Any = {"facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0}
 
 # Text stays text (fonttype 'none'): it can be selected, searched and enlarged, it takes a tenth of the bytes of
 # outlines, and it does not depend on the glyphs of the matplotlib release. A reader without the first font sees

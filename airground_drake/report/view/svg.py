@@ -84,7 +84,9 @@ def _clean(element: ET.Element, prefix: str, used: set[str]) -> None:
     for name, value in list(element.attrib.items()):
         if name == "id" and value in used:
             element.set(name, f"{prefix}-{value}")
-        elif name in ("id", "overflow") or name.lower().startswith(("on", _XLINK)) or _leads_outside(value):
+        elif (
+            name in ("id", "overflow") or name.lower().startswith(("on", _XLINK)) or "url(" in _REFERENCE.sub("", value)
+        ):
             del element.attrib[name]
         elif "url(" in value:
             element.set(name, _REFERENCE.sub(rf"url(#{prefix}-\1)", value))
@@ -94,7 +96,3 @@ def _clean(element: ET.Element, prefix: str, used: set[str]) -> None:
     if not (element.text or "").strip():  # spaces between elements are half of the bytes
         element.text = None
     element.tail = (element.tail or "").strip() or None
-
-
-def _leads_outside(value: str) -> bool:
-    return "url(" in value and "url(" in _REFERENCE.sub("", value)

@@ -40,7 +40,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, accepted_proposals, sightings
-from airground_drake.uav.planner import PlannerState, sent_after
+from airground_drake.uav.planner import Instant, PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import GatekeeperDecision
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
@@ -90,8 +90,7 @@ class Batch:
         self.gatekeepers: Gatekeepers | None = components.make_gatekeepers(given, self.law) if method.gated else None
         self._avoidance = components.make_avoidance(given)
         self.near = Around(world.around(world.select("ugv")), world.around(world.select("uav")))
-        zeta = components.threshold(given)
-        trigger, noise = components.make_trigger(given, zeta), given.decision
+        trigger, noise = components.make_trigger(given), given.decision
         breaks, places = components.stack_presets(presets)
         scripts = [vertices_of(body) for body in world.moving[r:]]
         gated, steering = self.gatekeepers is not None, world.steering
@@ -130,7 +129,7 @@ class Batch:
             body.plant.heading_rad if isinstance(body.plant, Unicycle) else 0.0 for body in world.bodies[:n]
         ])  # fmt: skip
         self.rows = int(1.3 * len(ticks)) + 400
-        self.zeta = float(zeta)
+        self.zeta = float(trigger.zeta)
 
     @cached_property
     def meta(self) -> dict[str, Any]:
@@ -345,11 +344,9 @@ class Going:
             return None
         places = state.place.copy()
         stands = standing(watched(state.halts, t, places.reshape(-1), self._team.room), t).tolist()
-        planned = batch.planner.plan(
-            memory, t, places[: len(batch.world.robots)], intervening, np.array(answers), reports, stands,
-            sightings(batch.world, t, places),
-        )  # fmt: skip
-        return sent_after(memory, planned, t, batch.planner.sender)
+        moving, robots = sightings(batch.world, t, places), places[: len(batch.world.robots)]
+        now = Instant(t, robots, intervening, np.array(answers), reports, stands, moving)
+        return sent_after(memory, batch.planner.plan(memory, now), t, batch.planner.sender)
 
     def _judged(self) -> GatekeeperState:
         """What the gatekeepers remember after a sample."""

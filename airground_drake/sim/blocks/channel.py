@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import nan
 
-from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State, ValueProducer
+from pydrake.common.value import Value
+from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from airground_drake.base.history import History, Immutable
 from airground_drake.model.bodies.motion import SAME_S
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_cached, declare_output, weakly
 from airground_drake.sim.blocks.signals import keep
 from airground_drake.uav.channel import Link, Transit
 from airground_drake.uav.outbox import Outbox, posted, repeated
@@ -51,11 +51,8 @@ class Downlink(LeafSystem):
         held = self.DeclareAbstractState(Value(Down()))
         self._state = int(held)
         needs = {self.abstract_state_ticket(held), *(port.ticket() for port in self._sent), self.time_ticket()}
-        producer = ValueProducer(allocate=lambda: Value(Down()), calc=weakly(self._calc))
-        self._now = self.DeclareCacheEntry("now", producer, needs).cache_index()
-        self.DeclareAbstractOutputPort(
-            "inbox", lambda: Value(()), weakly(self._calc_inbox), prerequisites_of_calc=needs
-        )
+        self._now = declare_cached(self, "now", Down(), type(self)._arrived, needs)
+        declare_output(self, "inbox", Value(()), lambda self, context: self.now(context).transit.arrived, needs)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, weakly(self._update))
 
     def now(self, context: Context) -> Down:
@@ -63,19 +60,16 @@ class Downlink(LeafSystem):
         state: Down = self.get_cache_entry(self._now).Eval(context)
         return state
 
-    def _calc(self, context: Context, output: AbstractValue) -> None:
+    def _arrived(self, context: Context) -> Down:
         before: Down = context.get_abstract_state(self._state).get_value()
         box = posted(before.box, [port.Eval(context) for port in self._sent])
-        output.set_value(self._carried(before, box, context.get_time()))
+        return self._carried(before, box, context.get_time())
 
     def _carried(self, before: Down, box: Outbox, t: float) -> Down:
         transit = self._link.carry(before.transit, box.messages, t)
         if box is before.box and transit is before.transit:
             return before
         return replace(before, box=box, transit=transit)
-
-    def _calc_inbox(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.now(context).transit.arrived)
 
     def _update(self, context: Context, state: State) -> EventStatus:
         t = context.get_time()
@@ -103,9 +97,7 @@ class Uplink(LeafSystem):
         self._outbox = self.DeclareAbstractInputPort("outbox", Value(()))
         held = self.DeclareAbstractState(Value(Transit()))
         self._state, needs = int(held), {self.abstract_state_ticket(held), self._outbox.ticket(), self.time_ticket()}
-        self._heard = self.DeclareAbstractOutputPort(
-            "heard", lambda: Value(Transit()), weakly(self._calc), prerequisites_of_calc=needs
-        )
+        self._heard = declare_output(self, "heard", Value(Transit()), type(self)._arrived, needs)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, weakly(self._update))
 
     def now(self, context: Context) -> Transit:
@@ -113,9 +105,9 @@ class Uplink(LeafSystem):
         state: Transit = self._heard.Eval(context)
         return state
 
-    def _calc(self, context: Context, output: AbstractValue) -> None:
+    def _arrived(self, context: Context) -> Transit:
         before: Transit = context.get_abstract_state(self._state).get_value()
-        output.set_value(self._link.carry(before, self._outbox.Eval(context), context.get_time()))
+        return self._link.carry(before, self._outbox.Eval(context), context.get_time())
 
     def _update(self, context: Context, state: State) -> EventStatus:
         return keep(state, self._state, self.now(context))

@@ -12,15 +12,7 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import (
-    BasicVector,
-    Context,
-    DiscreteValues,
-    LeafSystem,
-    NumericParameterIndex,
-    ValueProducer,
-)
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, NumericParameterIndex
 
 from airground_drake.base.arrays import Array, read_only
 from airground_drake.base.errors import PluginError, described, raised_as, short
@@ -31,7 +23,7 @@ from airground_drake.model.law.task import Task
 from airground_drake.model.law.tasks import FormationTask
 from airground_drake.model.law.ugv_law import AcceptedMotion, UgvLaw
 from airground_drake.model.plants.steering import steer_all
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_cached, declare_output, weakly
 from airground_drake.sim.blocks.signals import Messages, UavGains, UgvGains, declare_bodies, declare_headings
 from airground_drake.uav.messages import NOTHING, accepted_proposals
 from airground_drake.uav.policy import Proposal
@@ -45,8 +37,7 @@ class _Controller(LeafSystem):
         self._view, self._most = view, max(1.0 / period_s, *gains)
         index = NumericParameterIndex(self.DeclareNumericParameter(BasicVector(list(gains))))
         self._gains_ticket = self.numeric_parameter_ticket(index)
-        producer = ValueProducer(allocate=lambda: Value(model), calc=weakly(self._calc_in_force))
-        self._cached = self.DeclareCacheEntry("law in force", producer, {self._gains_ticket}).cache_index()
+        self._cached = declare_cached(self, "law in force", model, type(self)._checked, {self._gains_ticket})
 
     def mutable_gains(self, context: Context) -> Any:
         """The gains in force as a named view; assigning to it changes the gains in this Context."""
@@ -55,13 +46,13 @@ class _Controller(LeafSystem):
     def _with_gains(self, *gains: float) -> Any:
         raise NotImplementedError
 
-    def _calc_in_force(self, context: Context, output: AbstractValue) -> None:
+    def _checked(self, context: Context) -> Any:
         gains = context.get_numeric_parameter(0).value().tolist()
         for name, gain in zip(self._view.get_fields(), gains, strict=True):
             if not 0.0 <= gain <= self._most:
                 wanted = f"allowed: 0 to {self._most:.9g} 1/s, one over the control period"
                 raise ValueError(f"{name} = {gain!r} in the Context of {self.GetSystemPathname()}; {wanted}")
-        output.set_value(self._with_gains(*gains))
+        return self._with_gains(*gains)
 
     def _in_force(self, context: Context) -> Any:
         """What `_with_gains` returns for the gains in force."""
@@ -106,8 +97,7 @@ class UgvController(_Controller):
             self.DeclareStateOutputPort("command_share", self.DeclareDiscreteState(np.ones(n)))
         gains = law.avoidance.gain, law.motion_gain, law.intervention_gain
         self._declare_gains(UgvGains, gains, law, law.avoidance.period)
-        given = {self._gains_ticket}
-        self.DeclareVectorOutputPort("gains", len(gains), weakly(self._calc_gains), prerequisites_of_calc=given)
+        declare_output(self, "gains", len(gains), type(self)._gains, {self._gains_ticket})
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
     def parameters(self, context: Context) -> dict[str, Any]:
@@ -117,9 +107,9 @@ class UgvController(_Controller):
     def _with_gains(self, *gains: float) -> UgvLaw:
         return self.law.with_gains(*gains)
 
-    def _calc_gains(self, context: Context, output: BasicVector) -> None:
+    def _gains(self, context: Context) -> list[float]:
         law: UgvLaw = self._in_force(context)
-        output.SetFromVector([law.avoidance.gain, law.motion_gain, law.intervention_gain])
+        return [law.avoidance.gain, law.motion_gain, law.intervention_gain]
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         positions = _finite(self._bodies.Eval(context)).reshape(-1, 3)

@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -14,7 +13,6 @@ from pydrake.systems.framework import (
     EventStatus,
     LeafSystem,
     State,
-    ValueProducer,
     WitnessFunction,
     WitnessFunctionDirection,
 )
@@ -24,16 +22,8 @@ from airground_drake.base.errors import PluginError, short
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.trigger.automaton import NEW, Trigger, advance, anything_due, are_numbers, begin
-from airground_drake.model.trigger.excursion import (
-    Corners,
-    bends,
-    extremes,
-    gathered,
-    ranges,
-    stretches,
-    variables,
-)
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.model.trigger.excursion import Corners, bends, extremes, gathered, ranges, stretches, variables
+from airground_drake.sim.blocks.lifetime import declare_cached, declare_output, weakly
 from airground_drake.sim.blocks.signals import TriggerLevels, components_of, declare_bodies
 
 NOT_BEGUN = -1.0  # stands for the beginning of a run or a step, s, before the first one
@@ -75,14 +65,9 @@ class DecisionBlock(LeafSystem):
         self._noise = self.DeclareVectorInputPort("noise", count)
         self.DeclareDiscreteState(np.array([NOT_BEGUN, *([0.0] * 5 * count)]))
         given = {self._bodies.ticket(), self._reference.ticket(), self._noise.ticket(), self.time_ticket()}
-        producer = ValueProducer(allocate=lambda: Value(np.zeros(0)), calc=weakly(self._calc_signals))
-        self._signals = self.DeclareCacheEntry("signals", producer, given).cache_index()
-        self.DeclareVectorOutputPort(
-            "decision_variable", count, weakly(self._calc_variable), prerequisites_of_calc=given
-        )
-        self.DeclareVectorOutputPort(
-            "decision_range", 2 * count, weakly(self._calc_range), prerequisites_of_calc={*given, self.xd_ticket()}
-        )
+        self._cached = declare_cached(self, "signals", np.zeros(0), type(self)._signals_now, given)
+        declare_output(self, "decision_variable", count, lambda self, context: self._signals(context)[5::5], given)
+        declare_output(self, "decision_range", 2 * count, type(self)._range, {*given, self.xd_ticket()})
         self.DeclareInitializationDiscreteUpdateEvent(weakly(self._begin_step))
         self.DeclarePerStepDiscreteUpdateEvent(weakly(self._begin_step))
 
@@ -95,11 +80,13 @@ class DecisionBlock(LeafSystem):
         # begin, end: s; before: (n, 4), m
         return np.sort(ends, axis=0)
 
-    def _calc_signals(self, context: Context, output: AbstractValue) -> None:
+    def _signals_now(self, context: Context) -> Array:
         """The numbers that the state keeps, at this instant."""
         position, reference = self._bodies.Eval(context)[self._ugvs], self._reference.Eval(context)
-        signals = gathered(context.get_time(), position, reference, self._noise.Eval(context))
-        output.set_value(self._with_variable(signals))
+        return self._with_variable(gathered(context.get_time(), position, reference, self._noise.Eval(context)))
+
+    def _signals(self, context: Context) -> Array:
+        return np.asarray(self.get_cache_entry(self._cached).Eval(context))
 
     def _with_variable(self, signals: Array) -> Array:
         """Signals whose x of (15) is replaced by that of this block."""
@@ -117,14 +104,9 @@ class DecisionBlock(LeafSystem):
         wanted = f"wanted: {len(parts)} finite numbers, m"
         raise PluginError(f"decision block {type(self).__name__} returned {short(repr(given))} as x; {wanted}")
 
-    def _calc_variable(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self.get_cache_entry(self._signals).Eval(context)[5::5])
-
-    def _calc_range(self, context: Context, output: BasicVector) -> None:
-        begun, now = context.get_discrete_state(0).value(), self.get_cache_entry(self._signals).Eval(context)
-        if begun[0] == NOT_BEGUN:
-            begun = now
-        output.SetFromVector(self._ranges(begun, now))
+    def _range(self, context: Context) -> Array:
+        begun, now = context.get_discrete_state(0).value(), self._signals(context)
+        return self._ranges(now if begun[0] == NOT_BEGUN else begun, now)
 
     def _ranges(self, begun: Array, now: Array) -> Array:
         """Smallest x over a step, then the largest, (2n,), m, from the signals at its ends."""
@@ -144,7 +126,7 @@ class DecisionBlock(LeafSystem):
 
     def _begin_step(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Keep the signals of this instant: the end of a step, or the start of a simulator."""
-        discrete.set_value(0, self.get_cache_entry(self._signals).Eval(context))
+        discrete.set_value(0, self._signals(context))
         return EventStatus.Succeeded()
 
 

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+from pydrake.common.value import Value
+from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
+from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.world import World
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_output, weakly
 from airground_drake.sim.blocks.signals import (
     Answer,
     Messages,
@@ -65,11 +66,9 @@ class Gatekeeper(LeafSystem):
         if retry is None:
             self._proposals = Messages(self, "proposals", n, Proposal)
         else:
-            self._inbox = declare_inbox(self, n, held, weakly(self._calc_held), weakly(self._calc_outbox))
-        self.DeclareVectorOutputPort("answers", 2 * n, weakly(self._calc_answers), prerequisites_of_calc=held)
-        self.DeclareAbstractOutputPort(
-            "reports", lambda: no_reports(n), weakly(self._calc_reports), prerequisites_of_calc=held
-        )
+            self._inbox = declare_inbox(self, n, held, lambda self, context: self._now(context).held)
+        declare_output(self, "answers", 2 * n, lambda self, context: self._memory(context).answers, held)
+        declare_output(self, "reports", no_reports(n), lambda self, context: self._memory(context).reports, held)
         self._ticks = Ticks(period, control)
         self.DeclarePeriodicUnrestrictedUpdateEvent(self._ticks.period, 0.0, weakly(self._update))
 
@@ -86,12 +85,6 @@ class Gatekeeper(LeafSystem):
         memory: GatekeeperState = context.get_abstract_state(self._state).get_value()
         return memory
 
-    def _calc_answers(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._memory(context).answers)
-
-    def _calc_reports(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self._memory(context).reports)
-
     def desk(self, context: Context) -> Desk:
         """With a channel, what was read and answered up to the last sample."""
         return self._memory(context).desk or Desk.empty(0)
@@ -99,12 +92,6 @@ class Gatekeeper(LeafSystem):
     def _now(self, context: Context) -> Desk:
         """The desk when all is read that has arrived."""
         return read(self.desk(context), self._inbox.Eval(context), context.get_time())
-
-    def _calc_held(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self._now(context).held)
-
-    def _calc_outbox(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.desk(context).outbox)
 
     def _update(self, context: Context, state: State) -> EventStatus:
         if not self._ticks.due(context.get_time()):
@@ -149,16 +136,12 @@ class DirectAcceptance(LeafSystem):
         else:
             state = self.DeclareAbstractState(Value(Obeying.empty(count)))
             self._state, held = int(state), {self.abstract_state_ticket(state)}
-            self._inbox = declare_inbox(self, count, held, weakly(self._calc_held), weakly(self._calc_outbox), now=True)
+            self._inbox = declare_inbox(self, count, held, lambda self, context: self.desk(context).held, now=True)
             needs = {*held, self._inbox.ticket()}
             self.DeclarePeriodicUnrestrictedUpdateEvent(channel_period, 0.0, weakly(self._update))
-        self.DeclareVectorOutputPort("answers", 2 * count, weakly(self._calc_answers), prerequisites_of_calc=needs)
-        self.DeclareAbstractOutputPort(
-            "reports",
-            lambda: no_reports(count),
-            lambda context, output: output.set_value((Report(),) * count),
-            prerequisites_of_calc={self.nothing_ticket()},
-        )
+        declare_output(self, "answers", 2 * count, type(self)._answers, needs)
+        nothing = {self.nothing_ticket()}
+        declare_output(self, "reports", no_reports(count), lambda self, context: (Report(),) * count, nothing)
 
     def desk(self, context: Context) -> Desk:
         """With a channel, what was read and answered up to the time of this Context."""
@@ -168,15 +151,9 @@ class DirectAcceptance(LeafSystem):
         before: Obeying = context.get_abstract_state(self._state).get_value()
         return before.after(self._inbox.Eval(context))
 
-    def _calc_answers(self, context: Context, output: BasicVector) -> None:
+    def _answers(self, context: Context) -> Array:
         held = self.desk(context).held if self._channel else self._proposals.Eval(context)
-        output.SetFromVector(laid_out(Answer, obeyed(held)))
-
-    def _calc_held(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.desk(context).held)
-
-    def _calc_outbox(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.desk(context).outbox)
+        return laid_out(Answer, obeyed(held))
 
     def _update(self, context: Context, state: State) -> EventStatus:
         return keep(state, self._state, self._now(context))

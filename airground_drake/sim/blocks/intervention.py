@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State, ValueProducer
+from pydrake.common.value import Value
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem, State
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import World
 from airground_drake.model.trigger.automaton import FIELDS, INTERVENING
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_cached, declare_output, weakly
 from airground_drake.sim.blocks.signals import Messages, components_of, declare_bodies, no_proposals
 from airground_drake.sim.blocks.ticks import Ticks
 from airground_drake.uav.channel import Transit
@@ -19,7 +19,7 @@ from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
 from airground_drake.uav.messages import Report, Reports, sightings
 from airground_drake.uav.outbox import answers_heard
-from airground_drake.uav.planner import Planner, PlannerState, sent_after
+from airground_drake.uav.planner import Instant, Planner, PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
 
 
@@ -66,16 +66,13 @@ class InterventionPlanner(LeafSystem):
         self._memory = int(held)
         remembers = {self.abstract_state_ticket(held)}
         if channel:
-            self.DeclareAbstractOutputPort(
-                "sent", lambda: Value(planner.start()), weakly(self._calc_sent), prerequisites_of_calc=remembers
-            )
+            declare_output(self, "sent", Value(planner.start()), type(self).memory, remembers)
         if not (channel and alone):
-            self.DeclareAbstractOutputPort(
-                "proposals", lambda: no_proposals(n), weakly(self._calc_proposals), prerequisites_of_calc=remembers
-            )
+            sent = no_proposals(n)
+            declare_output(self, "proposals", sent, lambda self, context: self.memory(context).proposals, remembers)
         # Drake empties this slot of the Context when time, state or an input changes
-        empty = ValueProducer(allocate=lambda: Value(_Ahead()), calc=lambda _, output: output.set_value(_Ahead()))
-        self._ahead = self.DeclareCacheEntry("planned ahead", empty, {self.all_sources_ticket()}).cache_index()
+        needs = {self.all_sources_ticket()}
+        self._ahead = declare_cached(self, "planned ahead", _Ahead(), lambda *_: _Ahead(), needs)
         self._ticks = Ticks(planner.period, control_period)
         self._room = room(planner.max_speed)
         self.DeclareDiscreteState(np.tile([0.0, 0.0, 0.0, NOT_WATCHED], n))
@@ -99,12 +96,6 @@ class InterventionPlanner(LeafSystem):
     def close(self) -> None:
         """End the processes of policies; the next run starts them again."""
         self._planner.database.close()
-
-    def _calc_proposals(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.memory(context).proposals)
-
-    def _calc_sent(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.memory(context))
 
     def _watch(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         if not self._ticks.due(context.get_time()):
@@ -152,10 +143,8 @@ class InterventionPlanner(LeafSystem):
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
         moving = sightings(self._world, t, bodies)
         others = () if self._others is None else self._others.Eval(context)
-        memory = self._planner.plan(
-            before, t, bodies[self._robots], intervening, answers, reports, stands, moving, others
-        )
-        return sent_after(before, memory, t, self._planner.sender)
+        now = Instant(t, bodies[self._robots], intervening, answers, reports, stands, moving, others)
+        return sent_after(before, self._planner.plan(before, now), t, self._planner.sender)
 
 
 class AllProposals(LeafSystem):
@@ -168,13 +157,9 @@ class AllProposals(LeafSystem):
         """Declare ports for some UAVs and so many UGVs."""
         super().__init__()
         self._of_uavs = [Messages(self, f"proposals_{uav}", count, Proposal) for uav in uavs]
-        self.DeclareAbstractOutputPort(
-            "proposals",
-            lambda: no_proposals(count),
-            weakly(self._calc),
-            prerequisites_of_calc={messages.port.ticket() for messages in self._of_uavs},
-        )
+        needs = {messages.port.ticket() for messages in self._of_uavs}
+        declare_output(self, "proposals", no_proposals(count), type(self)._proposals, needs)
 
-    def _calc(self, context: Context, output: AbstractValue) -> None:
+    def _proposals(self, context: Context) -> tuple[Proposal | None, ...]:
         asked = zip(*(messages.Eval(context) for messages in self._of_uavs), strict=True)
-        output.set_value(tuple(next((one for one in of_ugv if one is not None), None) for of_ugv in asked))
+        return tuple(next((one for one in of_ugv if one is not None), None) for of_ugv in asked)

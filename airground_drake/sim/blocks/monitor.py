@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.history import Immutable
@@ -15,7 +15,7 @@ from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.world import World
 from airground_drake.model.law.avoidance import Avoidance
 from airground_drake.model.plants.steering import steer_all
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_output, weakly
 from airground_drake.sim.blocks.signals import Messages, declare_bodies, declare_headings
 from airground_drake.uav.messages import accepted_proposals
 from airground_drake.uav.policy import Proposal
@@ -128,9 +128,7 @@ class Monitor(LeafSystem):
         self._proposals = Messages(self, "proposals", n, Proposal)
         self._answers = self.DeclareVectorInputPort("answers", 2 * n)
         self._memory = self.DeclareAbstractState(Value(Memory()))
-        self.DeclareVectorOutputPort(
-            "violation", 5, weakly(self._calc), prerequisites_of_calc={self.abstract_state_ticket(self._memory)}
-        )
+        declare_output(self, "violation", 5, type(self)._violation, {self.abstract_state_ticket(self._memory)})
         self.DeclarePeriodicUnrestrictedUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
     def violation(self, context: Context) -> Violation | None:
@@ -141,9 +139,9 @@ class Monitor(LeafSystem):
         memory: Memory = context.get_abstract_state(int(self._memory)).get_value()
         return memory
 
-    def _calc(self, context: Context, output: BasicVector) -> None:
+    def _violation(self, context: Context) -> list[float]:
         violation = self.violation(context)
-        output.SetFromVector([0.0, -1.0, -1.0, -1.0, -1.0] if violation is None else [1.0, *map(float, violation)])
+        return [0.0, -1.0, -1.0, -1.0, -1.0] if violation is None else [1.0, *map(float, violation)]
 
     def _update(self, context: Context, state: State) -> EventStatus:
         memory = self._remembered(context)

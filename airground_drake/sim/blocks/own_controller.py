@@ -23,8 +23,8 @@ from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.scenario.schema import OwnController
 from airground_drake.sim.blocks.controllers import sampling_of
 from airground_drake.sim.blocks.lifetime import weakly
-from airground_drake.sim.blocks.plant import code_of
-from airground_drake.sim.blocks.signals import UgvGains
+from airground_drake.sim.blocks.plant import users_system
+from airground_drake.sim.blocks.signals import UgvGains, inputs_of, outputs_of
 from airground_drake.uav.messages import NOTHING
 
 # Makes a controller from the world, the package's law and parameters, as described in docs/extending.md.
@@ -72,7 +72,7 @@ class OwnUgvController(Diagram):
         super().__init__()
         self._kind, period = given.kind, law.avoidance.period
         about = f"controller {given.kind!r}"
-        system = _made(about, given, world, law, make)
+        system = users_system(about, UGV_CONTROLLERS, given.kind, make, world=world, law=law, **given.parameters)
         n = len(world.names("ugv"))
         sizes = {"command": 3 * n, "executing": n, "gains": len(UgvGains.get_fields())}
         sizes |= {"command_share": n} if world.steering is not None else {}
@@ -87,7 +87,7 @@ class OwnUgvController(Diagram):
         for name, port in outputs.items():
             builder.Connect(port, checked.GetInputPort(name))
             builder.ExportOutput(checked.GetOutputPort(name), name)
-        for port in (system.get_input_port(i) for i in range(system.num_input_ports())):
+        for port in inputs_of(system):
             builder.ExportInput(port, port.get_name())
         builder.BuildInto(self)
 
@@ -97,28 +97,15 @@ class OwnUgvController(Diagram):
 
     def require_inputs(self, fed: Collection[str]) -> None:
         """Refuse an input port that nothing feeds."""
-        for name in (self.get_input_port(i).get_name() for i in range(self.num_input_ports())):
-            if name not in fed:
+        for port in inputs_of(self):
+            if (name := port.get_name()) not in fed:
                 allowed = f"allowed: {', '.join(sorted(fed))}"
                 raise PluginError(f"controller {self._kind!r} has an input port {name!r}; {allowed}")
 
 
-def _made(about: str, given: OwnController, world: World, law: UgvLaw, make: ControllerFactory | None) -> System:
-    parameters: dict[str, Any] = {"world": world, "law": law, **given.parameters}
-    if make is None:
-        return UGV_CONTROLLERS.make(given.kind, System, **parameters)
-    try:
-        system: Any = make(**parameters)
-    except Exception as error:  # the user's code may raise anything
-        raise PluginError(f"{about}: {described(error, code_of(given.kind, make).function)}") from error
-    if not isinstance(system, System):
-        raise PluginError(f"{about} is made by a function that returns {short(repr(system))}; allowed: a Drake System")
-    return system
-
-
 def _outputs(about: str, system: System, sizes: dict[str, int]) -> dict[str, OutputPort]:
     """Its output ports by name, of the right sizes; what the plants act on is held between control samples."""
-    ports = [system.get_output_port(i) for i in range(system.num_output_ports())]
+    ports = outputs_of(system)
     has = {port.get_name(): port.size() for port in ports}
     if any(has.get(name) != size for name, size in sizes.items()):
         raise PluginError(f"{about} has output ports of sizes {has}; they must include {sizes}")

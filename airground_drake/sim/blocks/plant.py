@@ -26,7 +26,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, UnknownNameError, described, short
-from airground_drake.base.registry import PLANTS
+from airground_drake.base.registry import PLANTS, Registry
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import Body
 from airground_drake.model.plants.own import Own, OwnKeys
@@ -34,7 +34,8 @@ from airground_drake.model.plants.plant import HEADING, Plant
 from airground_drake.model.plants.scripted import Scripted
 from airground_drake.scenario.load import validated
 from airground_drake.scenario.schema import OwnController, Scenario
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_output, weakly
+from airground_drake.sim.blocks.signals import inputs_of, outputs_of
 
 START_M = 1e-9  # a body may begin this far from its start, m: forward kinematics err by less
 
@@ -80,9 +81,10 @@ class SteeredBody(LeafSystem):
         self.DeclareDiscreteState(np.append(0.0, plant.memory()))
         needs = {self._velocity.ticket(), self._base.ticket(), self.xd_ticket(), self.time_ticket()}
         names = plant.signals
-        self.DeclareVectorOutputPort("signals", len(names), weakly(self._calc), prerequisites_of_calc=needs)
+        declare_output(self, "signals", len(names), type(self)._signals, needs)
         if HEADING in names:
-            self.DeclareVectorOutputPort("heading", 1, weakly(self._calc_heading), prerequisites_of_calc=needs)
+            heading = [names.index(HEADING)]
+            declare_output(self, "heading", 1, lambda self, context: self._signals(context)[heading], needs)
         self.DeclarePeriodicDiscreteUpdateEvent(period_s, 0.0, weakly(self._update))
 
     def _since(self, context: Context) -> tuple[float, Array]:
@@ -96,13 +98,9 @@ class SteeredBody(LeafSystem):
         memory = self._plant.remembered(memory, self._velocity.Eval(context), elapsed)
         discrete.set_value(0, np.append(context.get_time(), memory))
 
-    def _calc(self, context: Context, output: BasicVector) -> None:
+    def _signals(self, context: Context) -> Array:
         elapsed, memory = self._since(context)
-        output.SetFromVector(self._plant.at(memory, self._base.Eval(context), self._velocity.Eval(context), elapsed))
-
-    def _calc_heading(self, context: Context, output: BasicVector) -> None:
-        signals = self.GetOutputPort("signals").Eval(context)
-        output.SetFromVector(signals[[self._plant.signals.index(HEADING)]])
+        return self._plant.at(memory, self._base.Eval(context), self._velocity.Eval(context), elapsed)
 
 
 def steered_plant(body: Body, period_s: float) -> Diagram:
@@ -116,7 +114,7 @@ def steered_plant(body: Body, period_s: float) -> Diagram:
     builder.ConnectInput("velocity", moved.GetInputPort("velocity"))
     builder.Connect(base.get_output_port(), moved.GetInputPort("base"))
     builder.ExportOutput(base.get_output_port(), "position")
-    for port in (moved.get_output_port(i) for i in range(moved.num_output_ports())):
+    for port in outputs_of(moved):
         builder.ExportOutput(port, port.get_name())
     return builder.Build()
 
@@ -292,6 +290,21 @@ def _steps(system: System) -> Iterator[float]:
         yield timing.period_sec()
 
 
+def users_system(
+    about: str, registry: Registry, name: str, make: Callable[..., System] | None, **parameters: Any
+) -> System:
+    """A user's plant or controller, from a class or a function, or else from the class of a name in the scenario."""
+    if make is None:
+        return registry.make(name, System, **parameters)
+    try:
+        system: Any = make(**parameters)
+    except Exception as error:  # the user's code may raise anything
+        raise PluginError(f"{about}: {described(error, code_of(name, make).function)}") from error
+    if not isinstance(system, System):
+        raise PluginError(f"{about} is made by a function that returns {short(repr(system))}; allowed: a Drake System")
+    return system
+
+
 # Output ports of a user's plant, and their sizes; only the first is needed, and may have another name.
 OUTPUTS = {"position": 3, "body": 3, "heading": 1}
 
@@ -300,21 +313,10 @@ def own_plant(body: Body, make: Callable[..., System] | None) -> Diagram:
     """A user's plant behind an `OwnBody`."""
     # make: in place of the class that the plant names.
     assert isinstance(body.plant, Own)
-    name, parameters = body.plant.name, {**body.plant.parameters, "start": body.start_m.copy()}
-    about = f"plant {name!r} of {body.name}"
-    if make is None:
-        system: Any = PLANTS.make(name, System, **parameters)
-    else:
-        try:
-            system = make(**parameters)
-        except Exception as error:  # the user's code may raise anything
-            raise PluginError(f"{about}: {described(error, make)}") from error
-    if not isinstance(system, System):
-        raise PluginError(
-            f"{about} is made by a function that returns {type(system).__name__}; allowed: a Drake System"
-        )
-    inputs = [system.get_input_port(i).size() for i in range(system.num_input_ports())]
-    ports = [system.get_output_port(i) for i in range(system.num_output_ports())]
+    about = f"plant {body.plant.name!r} of {body.name}"
+    start = body.start_m.copy()
+    system = users_system(about, PLANTS, body.plant.name, make, **body.plant.parameters, start=start)
+    inputs, ports = [port.size() for port in inputs_of(system)], outputs_of(system)
     outputs = {"position": ports[0]} if ports else {}
     outputs |= {port.get_name(): port for port in ports[1:] if port.get_name() in OUTPUTS}
     if inputs[:1] != [3] or not outputs or any(port.size() != OUTPUTS[name] for name, port in outputs.items()):
@@ -338,10 +340,10 @@ def _checked(system: System, outputs: Mapping[str, OutputPort], checked: OwnBody
     builder = DiagramBuilder()
     builder.AddNamedSystem("own", system)
     builder.AddNamedSystem("checked", checked)
-    for port in (checked.get_input_port(i) for i in range(checked.num_input_ports())):
+    for port in inputs_of(checked):
         builder.Connect(outputs.get(port.get_name(), outputs["position"]), port)
     builder.ExportInput(system.get_input_port(0), "velocity")
-    for port in (checked.get_output_port(i) for i in range(checked.num_output_ports())):
+    for port in outputs_of(checked):
         builder.ExportOutput(port, port.get_name())
     return builder.Build()
 
@@ -384,14 +386,12 @@ class VelocityDisturbance(LeafSystem):
         super().__init__()
         self._command = self.DeclareVectorInputPort("command", 3 * len(robots))
         self._disturbances = [self.DeclareVectorInputPort(f"disturbance_{robot}", 3) for robot in robots]
-        inputs = (self._command, *self._disturbances)
-        self.DeclareVectorOutputPort(
-            "velocity", 3 * len(robots), weakly(self._calc), prerequisites_of_calc={port.ticket() for port in inputs}
-        )
+        needs = {port.ticket() for port in (self._command, *self._disturbances)}
+        declare_output(self, "velocity", 3 * len(robots), type(self)._velocity, needs)
 
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        velocity = self._command.Eval(context).copy()
+    def _velocity(self, context: Context) -> Array:
+        velocity: Array = self._command.Eval(context).copy()
         for i, port in enumerate(self._disturbances):
             if port.HasValue(context):
                 velocity[3 * i : 3 * i + 3] += port.Eval(context)
-        output.SetFromVector(velocity)
+        return velocity

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, System
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, System
 
 from airground_drake.base.arrays import Array, Flags
 from airground_drake.model.bodies.motion import SAME_S
@@ -19,7 +19,7 @@ from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.scenario.rounding import SPARE_S
 from airground_drake.scenario.schema import Faults, Scenario
 from airground_drake.sim.blocks.controllers import UgvController, asked_at
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_output, weakly
 from airground_drake.sim.blocks.signals import declare_bodies
 from airground_drake.uav.channel import lost
 from airground_drake.uav.policy import Proposal
@@ -46,18 +46,18 @@ class Announcements(LeafSystem):
         self._bodies = declare_bodies(self, world)
         self._command = self.DeclareVectorInputPort("ugv_command", 3 * len(world.names("ugv")))
         self.DeclareDiscreteState(size + 1)
-        self.DeclareVectorOutputPort("announced", size, weakly(self._calc))
+        declare_output(self, "announced", size, type(self)._announced)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, weakly(self._update))
 
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        places = self._bodies.Eval(context).reshape(-1, 3).copy()
+    def _announced(self, context: Context) -> Array:
+        places: Array = self._bodies.Eval(context).reshape(-1, 3).copy()
         *last, begun = context.get_discrete_state(0).value()
         if begun:
             sample = int((context.get_time() + SAME_S) / self._period)
             on_time = random.Random(f"{self._seed}/late/{sample}").random() >= self._late
             led = on_time * self._period * self._command.Eval(context).reshape(-1, 3)
             places[self._ugvs] = np.reshape(last, (-1, 3))[self._ugvs] + led
-        output.SetFromVector(places.ravel())
+        return places.ravel()
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         discrete.set_value(0, np.append(self._bodies.Eval(context), 1.0))
@@ -83,8 +83,8 @@ class Hearing(LeafSystem):
         self.DeclareDiscreteState(np.zeros(n * n))
         self.DeclareDiscreteState(np.tile(world.starts[self._ugvs], (n, 1)).ravel())
         self.DeclareDiscreteState(np.tile(world.starts[self._ugvs], (late, 1)).ravel())
-        self.DeclareVectorOutputPort("heard_s", n * n, weakly(self._calc_heard))
-        self.DeclareVectorOutputPort("last_places", 3 * n * n, weakly(self._calc_places))
+        declare_output(self, "heard_s", n * n, lambda self, context: self._now(context)[0].ravel())
+        declare_output(self, "last_places", 3 * n * n, lambda self, context: self._now(context)[1].ravel())
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, weakly(self._update))
 
     def _now(self, context: Context) -> tuple[Array, Array]:
@@ -100,12 +100,6 @@ class Hearing(LeafSystem):
             places[arrived] = np.broadcast_to(sent, (n, n, 3))[arrived]
             heard[own], places[own] = t, published
         return heard, places
-
-    def _calc_heard(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._now(context)[0].ravel())
-
-    def _calc_places(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._now(context)[1].ravel())
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         for k, now in enumerate(self._now(context)):

@@ -2,10 +2,11 @@
 
 import math
 import random
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, partial
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import Context, LeafSystem
 
 from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.kinds import ROBOTS
@@ -13,7 +14,7 @@ from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import convex
 from airground_drake.scenario.schema import Sensing
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_output
 from airground_drake.sim.blocks.signals import declare_bodies
 
 TURN_S = 0.5  # after so long an adversary may change between away and sideways
@@ -102,16 +103,10 @@ class PositionSensing(LeafSystem):
 
     def __init__(self, errors: Errors, world: World) -> None:
         super().__init__()
-        self._errors, self._bodies = errors, declare_bodies(self, world)
+        self._bodies = declare_bodies(self, world)
         needs, size = {self._bodies.ticket(), self.time_ticket()}, 3 * len(world.moving)
-        self.DeclareVectorOutputPort("published", size, weakly(self._calc_published), prerequisites_of_calc=needs)
-        self.DeclareVectorOutputPort("seen_by_uav", size, weakly(self._calc_seen), prerequisites_of_calc=needs)
+        for measured in (errors.published, errors.seen_by_uav):
+            declare_output(self, measured.__name__, size, partial(type(self)._measured, measured=measured), needs)
 
-    def _places(self, context: Context) -> Array:
-        return np.asarray(self._bodies.Eval(context)).reshape(-1, 3)
-
-    def _calc_published(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._errors.published(context.get_time(), self._places(context)).ravel())
-
-    def _calc_seen(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._errors.seen_by_uav(context.get_time(), self._places(context)).ravel())
+    def _measured(self, context: Context, measured: Callable[[float, Array], Array]) -> Array:
+        return measured(context.get_time(), np.asarray(self._bodies.Eval(context)).reshape(-1, 3)).ravel()

@@ -1,17 +1,18 @@
 """Named views of vectors in ports and Contexts, and the types of messages."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from pydrake.common.containers import namedview
 from pydrake.common.value import AbstractValue, Value
-from pydrake.systems.framework import Context, EventStatus, InputPort, LeafSystem, State
+from pydrake.systems.framework import Context, EventStatus, InputPort, LeafSystem, OutputPort, State, System
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, short
 from airground_drake.model.bodies.kinds import Kind
 from airground_drake.model.bodies.world import World
-from airground_drake.sim.blocks.lifetime import weakly
+from airground_drake.sim.blocks.lifetime import declare_output, weakly
 from airground_drake.uav.messages import Report
 from airground_drake.uav.policy import Proposal
 
@@ -26,6 +27,14 @@ UgvGains = namedview("UgvGains", ["avoidance_gain_1_s", "motion_gain_1_s", "inte
 UavGains = namedview("UavGains", ["avoidance_gain_1_s", "formation_gain_1_s"])
 # Parameters of `EventTrigger`: see `model.trigger.automaton.Trigger`.
 TriggerLevels = namedview("TriggerLevels", ["zeta_m", "release_m", "dwell_s"])
+
+
+def inputs_of(system: System) -> list[InputPort]:
+    return [system.get_input_port(i) for i in range(system.num_input_ports())]
+
+
+def outputs_of(system: System) -> list[OutputPort]:
+    return [system.get_output_port(i) for i in range(system.num_output_ports())]
 
 
 def declare_bodies(system: LeafSystem, world: World) -> InputPort:
@@ -73,15 +82,16 @@ def keep(state: State, index: int, value: Any) -> EventStatus:
 
 
 def declare_inbox(
-    system: LeafSystem, count: int, state: set[Any], held: Any, outbox: Any, *, now: bool = False
+    system: Any, count: int, state: set[Any], held: Callable[[Any, Context], Any], *, now: bool = False
 ) -> InputPort:
     """Declare the ports of UGVs on a channel: in `inbox`; out `proposals`, those they hold, and `outbox`."""
     # now: whether what has just arrived is answered before the state is updated
     inbox = system.DeclareAbstractInputPort("inbox", Value(()))
     needs = {*state, inbox.ticket()}
-    system.DeclareAbstractOutputPort("proposals", lambda: no_proposals(count), held, prerequisites_of_calc=needs)
-    answered = needs if now else state
-    system.DeclareAbstractOutputPort("outbox", lambda: Value(()), outbox, prerequisites_of_calc=answered)
+    declare_output(system, "proposals", no_proposals(count), held, needs)
+    declare_output(
+        system, "outbox", Value(()), lambda self, context: self.desk(context).outbox, needs if now else state
+    )
     return inbox
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, LimitError, UnknownNameError, one_line
+from airground_drake.base.errors import FolderError, LimitError, UnknownNameError
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.base.registry import RUN_CLAIMS
 from airground_drake.base.statuses import UNDECIDED
@@ -61,10 +61,9 @@ def conduct(
     store = Store(folder, _manifest(spec, limits), resume=resume)
     try:
         if (last := max(store.finished, default=0)) >= wanted.stop:
-            raise FolderError(one_line(f"{folder} has draw {last}; allowed: -n {last + 1} or more"))
-        rule = InOrder(stopping, wanted) if stopping is not None else None
+            raise FolderError(f"{folder} has draw {last}; allowed: -n {last + 1} or more")
         known: Any = groupby(store.table().to_dict("records"), key=itemgetter("index"))
-        met = rule is not None and any(rule.met(index, list(rows)) for index, rows in known)
+        met = stopping is not None and any(stopping.met_in_order(index, list(rows)) for index, rows in known)
         left = [] if met else [index for index in wanted if index not in store.finished]
         progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
@@ -74,12 +73,12 @@ def conduct(
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
             told = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
             progress.advance(1.0, f"refuted: {told or 'nothing'}")
-            if rule is not None and rule.met(index, rows):
+            if stopping is not None and stopping.met_in_order(index, rows):
                 break
         table = store.table()
     finally:
         store.close()
-    stopped = rule.last if rule is not None else None
+    stopped = stopping.last if stopping is not None else None
     of: dict[str, Any] = {"name": spec.name, "title": spec.title, "spec": spec.source, "stopped": stopped}
     if stopped is not None:  # other processes may have finished later draws meanwhile
         table = table[table["index"] <= stopped]
@@ -113,6 +112,9 @@ class Stopping:
     def __post_init__(self) -> None:
         self._counts: dict[str, list[int]] = {}
         self._unfinished = Counter[str]()
+        self._waiting: dict[int, list[Row]] = {}  # finished draws with a gap before them
+        self._next = 0
+        self.last: int | None = None  # the draw that met the rule
 
     @classmethod
     def parse(cls, text: str, claims: Collection[str] = ()) -> Stopping:
@@ -141,29 +143,18 @@ class Stopping:
                 counts[2] += 1
         return bool(self._counts) and all(map(self._decides, self._counts))
 
+    def met_in_order(self, index: int, rows: list[Row]) -> bool:
+        """Take one more finished draw; return whether the draws without a gap before them meet the rule."""
+        self._waiting[index] = rows  # short draws finish first
+        while self.last is None and self._next in self._waiting:
+            if self.met(self._waiting.pop(self._next)):
+                self.last = self._next
+            self._next += 1
+        return self.last is not None
+
     def _decides(self, run: str) -> bool:
         refuted, undecided, tested = self._counts[run]
         unfinished = self._unfinished[run] + self._unfinished[""]
         if self.below:
             return confidence_sequence(refuted + undecided + unfinished, tested + unfinished).high < self.value
         return confidence_sequence(refuted, tested + unfinished).low > self.value
-
-
-class InOrder:
-    """Gives a rule the draws in the order of their numbers, since short draws finish first."""
-
-    def __init__(self, rule: Stopping, wanted: Iterable[int]) -> None:
-        """Expect the draws with these numbers, in this order."""
-        self._rule, self._wanted = rule, iter(wanted)
-        self._next = next(self._wanted, None)
-        self._waiting: dict[int, list[Row]] = {}
-        self.last: int | None = None  # the draw that met the rule
-
-    def met(self, index: int, rows: list[Row]) -> bool:
-        """Take one more finished draw; return whether the draws without a gap before them meet the rule."""
-        self._waiting[index] = rows
-        while self.last is None and self._next in self._waiting:
-            if self._rule.met(self._waiting.pop(self._next)):
-                self.last = self._next
-            self._next = next(self._wanted, None)
-        return self.last is not None

@@ -52,32 +52,21 @@ Sizes = Annotated[tuple[float, float], PlainValidator(_sizes), WithJsonSchema({}
 
 @dataclass(frozen=True)
 class Course:
-    """Ranges and sizes that a random course is drawn from.
-
-    Attributes:
-        ugvs: least and largest number of UGVs.
-        obstacles: least and largest number of points.
-        walls: least and largest number of thin walls.
-        boxes: least and largest number of boxes.
-        size_m: least and largest length of a wall, and of a side of a box, m.
-        length_m: distance between the two sides, m.
-        width_m: of the field, m.
-        preset_m_s: speed of the preset trajectories, m/s.
-        max_speed_m_s: of a UGV, m/s.
-        hidden: share of the obstacles that are not on the UAV's map.
-    """
+    """Ranges and sizes that a random course is drawn from."""
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
+    # Least and largest numbers: of UGVs, of obstacles that are points, thin walls, or boxes.
     ugvs: Ugvs = (1, 4)
     obstacles: Obstacles = (4, 9)
     walls: Obstacles = (0, 0)
     boxes: Obstacles = (0, 0)
-    size_m: Sizes = (0.5, 4.0)
-    length_m: Positive = 20.0
-    width_m: Positive = 16.0
-    preset_m_s: Positive = 1.0
-    max_speed_m_s: Positive = 3.0
+    size_m: Sizes = (0.5, 4.0)  # least and largest length of a wall, and of a side of a box
+    length_m: Positive = 20.0  # distance between the two sides
+    width_m: Positive = 16.0  # of the field
+    preset_m_s: Positive = 1.0  # speed of the preset trajectories
+    max_speed_m_s: Positive = 3.0  # of a UGV
+    # Share of the obstacles that are not on the UAV's map.
     hidden: Annotated[Number, Field(ge=0.0, le=1.0), BeforeValidator(as_float)] = 0.0
 
     @property

@@ -131,9 +131,8 @@ def _figures(result: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
     for (run, claim), rows in judged[judged["claim"].isin(SHOWN)].groupby(["run", "claim"]):
         values = rows["margin"].dropna().to_numpy()
         if len(values):
-            drawn.append(
-                _histogram(values, f"{claim} in run {run}: margin", "margin, " + str(rows["unit"].iloc[0]), 0.0)
-            )
+            unit = rows["unit"].iloc[0]
+            drawn.append(_histogram(values, f"{claim} in run {run}: margin", f"margin, {unit}", 0.0))
     runs = judged.drop_duplicates(["index", "run"])
     marks = {times["run"]: times["first_trigger_s"].get("mark") for times in result["times"]}
     for run, rows in runs.groupby("run"):

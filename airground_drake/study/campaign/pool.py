@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
-from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.errors import AirgroundError
 from airground_drake.base.parallel import processes
 
 DEATHS = 2  # an item is given up after this many of its processes have died
@@ -82,7 +82,7 @@ def cluster(scheduler: str, timeout_s: float = 10.0) -> Iterator[Pool]:
     try:
         client = dask.Client(scheduler, timeout=timeout_s, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise AirgroundError(one_line(f"no Dask scheduler at {scheduler}: {error}")) from None
+        raise AirgroundError(f"no Dask scheduler at {scheduler}: {error}") from None
     with client:
         yield partial(_on_cluster, dask, client)
 

@@ -77,8 +77,7 @@ class File:
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
     name: Annotated[
-        str,
-        wanted("a name of at most 100 letters, digits, _, . and -", pattern=f"^{PLAIN_NAME.pattern}$", strict=True),
+        str, wanted("a name of at most 100 letters, digits, _, . and -", pattern=f"^{PLAIN_NAME.pattern}$", strict=True)
     ]
     title: Words = ""
     scenario: Annotated[Words, wanted("a shipped scenario, or the path of a YAML file", min_length=1)]

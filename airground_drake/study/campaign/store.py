@@ -22,7 +22,7 @@ from typing import Any
 import pandas as pd
 
 from airground_drake.base import files
-from airground_drake.base.errors import FolderError, one_line
+from airground_drake.base.errors import FolderError
 from airground_drake.study.campaign.rows import COLUMNS, Row
 
 SCHEMA = "airground_drake.campaign/3"
@@ -42,7 +42,7 @@ class Store:
         self._manifest = manifest = {"schema": SCHEMA, **manifest}
         there = sorted(path.name for path in folder.iterdir() if not _is_nothing(path))
         if there and not resume:
-            raise FolderError(one_line(f"{folder} holds {there[0]!r}; allowed: a new or empty folder, or --resume"))
+            raise FolderError(f"{folder} holds {there[0]!r}; allowed: a new or empty folder, or --resume")
         if there:
             _be_the_same(folder, manifest)
         with files.wanted(folder / JOURNAL, "a regular file"):
@@ -55,7 +55,7 @@ class Store:
             os.close(self._journal)
             if isinstance(error, FolderError):
                 raise
-            raise FolderError(one_line(f"{folder} is in use by another campaign command")) from None
+            raise FolderError(f"{folder} is in use by another campaign command") from None
         files.sweep(folder)
         if not there:
             files.write_json(folder / MANIFEST, manifest)
@@ -111,7 +111,7 @@ def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
     """The manifest of a campaign and all rows of its finished draws, also while it runs."""
     manifest = _manifest(folder)
     if manifest is None:
-        raise FolderError(one_line(f"{folder} has no campaign: no {MANIFEST} of ours"))
+        raise FolderError(f"{folder} has no campaign: no {MANIFEST} of ours")
     parts = _read_parts(folder, manifest)
     lately, _ = _read_journal(folder / JOURNAL, manifest, set(parts["index"]))
     return manifest, _together([parts], lately)
@@ -130,10 +130,10 @@ def _is_nothing(path: Path) -> bool:
 def _be_the_same(folder: Path, manifest: dict[str, Any]) -> None:
     recorded = _manifest(folder)
     if recorded is None:
-        raise FolderError(one_line(f"{folder} has no campaign to resume: no {MANIFEST} of ours"))
+        raise FolderError(f"{folder} has no campaign to resume: no {MANIFEST} of ours")
     other = sorted(key for key in {*recorded, *manifest} if recorded.get(key) != manifest.get(key))
     if other:
-        raise FolderError(one_line(f"{folder} has another campaign ({', '.join(other)}); allowed: the same"))
+        raise FolderError(f"{folder} has another campaign ({', '.join(other)}); allowed: the same")
 
 
 def _manifest(folder: Path) -> dict[str, Any] | None:
@@ -146,7 +146,7 @@ def _manifest(folder: Path) -> dict[str, Any] | None:
 
 def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
     if (folder / PARTS).is_symlink():
-        raise FolderError(one_line(f"{folder / PARTS} is a link; wanted: a folder"))
+        raise FolderError(f"{folder / PARTS} is a link; wanted: a folder")
     parts, seen = [table_of([])], set[int]()
     for path in sorted((folder / PARTS).glob("*.parquet")):
         parts.append(_read_part(path))
@@ -162,9 +162,9 @@ def _read_part(path: Path) -> pd.DataFrame:
     try:
         part = files.read_table(_content(path))
     except ValueError as error:
-        raise FolderError(one_line(f"{path}: {error}")) from None
+        raise FolderError(f"{path}: {error}") from None
     if missing := [name for name in COLUMNS if name not in part]:
-        raise FolderError(one_line(f"{path} has no column {missing[0]!r}; allowed: parts as campaigns write them"))
+        raise FolderError(f"{path} has no column {missing[0]!r}; allowed: parts as campaigns write them")
     return part
 
 
@@ -173,7 +173,7 @@ def _content(path: Path) -> bytes:
     try:
         return files.read_bytes(path)
     except OSError as error:
-        raise FolderError(one_line(f"{path} cannot be read: {error.strerror}; wanted: a regular file")) from None
+        raise FolderError(f"{path} cannot be read: {error.strerror}; wanted: a regular file") from None
 
 
 def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tuple[dict[int, list[Row]], int]:
@@ -189,7 +189,7 @@ def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tupl
             index = rows[0]["index"]
         except (ValueError, TypeError, LookupError):
             cut = line.decode(errors="replace")[:80]
-            raise FolderError(one_line(f"{path} has a line that is no draw: {cut}")) from None
+            raise FolderError(f"{path} has a line that is no draw: {cut}") from None
         if index not in known:
             draws[index] = rows
     return draws, whole
@@ -216,7 +216,7 @@ def _as_written(path: Path, manifest: dict[str, Any], rows: Sequence[Any]) -> li
 
 def _changed(path: Path, index: object) -> FolderError:
     why = "its rows were changed, repeated or removed, or are of another campaign"
-    return FolderError(one_line(f"{path}: draw {index}: {why}; allowed: what the campaign wrote"))
+    return FolderError(f"{path}: draw {index}: {why}; allowed: what the campaign wrote")
 
 
 def table_of(rows: Sequence[Row]) -> pd.DataFrame:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, ScenarioError, described, one_line
+from airground_drake.base.errors import AirgroundError, ScenarioError, described
 from airground_drake.base.statuses import PASSING
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import Limits, within
@@ -77,7 +77,7 @@ def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits, e
     try:
         scenario = spec.scenario_of(values, index)
     except ScenarioError as error:
-        return [common | {"ended": INVALID, "what": one_line(str(error))}]
+        return [common | {"ended": INVALID, "what": str(error)}]
     return rows_of_scenario(spec, scenario, limits, common, engine)
 
 
@@ -93,7 +93,7 @@ def rows_of_scenario(
     except DifferenceError:
         raise
     except AirgroundError as error:
-        return [common | {"ended": INVALID, "what": one_line(str(error))}]
+        return [common | {"ended": INVALID, "what": str(error)}]
     except DrawOutOfTime as error:
         return [common | {"ended": STOPPED, "what": str(error)}]
     finally:
@@ -188,7 +188,7 @@ def _agree(screens: Sequence[Verdict], verdicts: Sequence[Verdict], trace: Trace
             ]
             where = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}"
             said = f"{where}: {ours.claim.id} is {told[1]} by the trace and {told[0]} by the array judge"
-            raise JudgesDifferError(one_line(f"{said}; --engine drake does without"))
+            raise JudgesDifferError(f"{said}; --engine drake does without")
 
 
 def _compared(trace: Trace, by_drake: Trace) -> str:
@@ -200,9 +200,7 @@ def _compared(trace: Trace, by_drake: Trace) -> str:
     if (difference := first_difference(by_drake, trace)) is not None:
         about, drakes, ours = difference
         told = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"
-        raise EnginesDifferError(
-            one_line(f"{told} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")
-        )
+        raise EnginesDifferError(f"{told} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")
     return BOTH
 
 

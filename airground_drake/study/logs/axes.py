@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import LogError, one_line
+from airground_drake.base.errors import LogError
 from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
 from airground_drake.study.logs.stream import PER_M, Stream
@@ -43,7 +43,7 @@ def chosen(streams: Mapping[str, Stream], choice: Mapping[str, str]) -> None:
 def _turn(stream: Stream, axes: str) -> None:
     places = _turned(stream.places, axes)
     if not np.isfinite(places[:, :2]).all():
-        raise LogError(one_line(f"{stream.label} has rows without z, and --axes {axes} needs them"))
+        raise LogError(f"{stream.label} has rows without z, and --axes {axes} needs them")
     stream.places = places
 
 
@@ -85,7 +85,7 @@ def _ask(robots: Mapping[str, Stream], scenario: Json, why: str, likely: Iterabl
         begins = ", with which they begin at their starts," if _fits(robots, scenario, first) else ""
         option = f"--axes={first}" if first[0] == "-" else f"--axes {first}"
         wanted = f"wanted: {option}{begins} if {OTHERS[first]}, or --axes {PLAIN} if they are as in the scenario"
-        raise LogError(one_line(f"the axes of the log are not clear: {why}; {wanted}"))
+        raise LogError(f"the axes of the log are not clear: {why}; {wanted}")
 
 
 def _fits(robots: Mapping[str, Stream], scenario: Json, axes: str) -> bool:

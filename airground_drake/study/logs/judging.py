@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import LogError, one_line
+from airground_drake.base.errors import LogError
 from airground_drake.check.files import Json
 from airground_drake.check.rules import SMALL
 from airground_drake.check.safety import shortfalls_m
@@ -252,7 +252,7 @@ def _judged(
     if not spans:
         times = (f"{n} {t.t_s[0]:.6g} to {t.t_s[-1]:.6g} s" for n, t in ((pair.robot, own), (pair.other, other)))
         wanted = f"wanted: logs of the same time, or --without {pair.robot}"
-        raise LogError(one_line(f"{' and '.join(times)} are never recorded at the same time; {wanted}"))
+        raise LogError(f"{' and '.join(times)} are never recorded at the same time; {wanted}")
     least, at, stretch = np.inf, 0.0, spans[0]
     below = list[Span]()
     law = _Law(pair, scenario)

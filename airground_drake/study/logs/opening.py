@@ -48,9 +48,9 @@ def _files(path: Path, log: Log) -> list[Path]:
     if not regular:
         why = "; folders in it are not read" if inside else ""
         why = f": {', '.join(log.ignored[-len(others) :][:3])}; wanted: regular files" if others else why
-        raise LogError(one_line(f"{path}: the folder has no files{why}"))
+        raise LogError(f"{path}: the folder has no files{why}")
     if len(regular) > MOST_FILES:
-        raise LogError(one_line(f"{path}: the folder has {len(regular)} files; allowed: {MOST_FILES}"))
+        raise LogError(f"{path}: the folder has {len(regular)} files; allowed: {MOST_FILES}")
     return regular
 
 

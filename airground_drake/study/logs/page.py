@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from airground_drake.base import files
 from airground_drake.base.arrays import Array
 from airground_drake.check.files import Json
-from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Table, panel
+from airground_drake.report.figures.panels import Figure, Table, panel, spread
 from airground_drake.report.html import render_beside
 from airground_drake.report.replay.page import page as replay_page
 from airground_drake.report.replay.scene import DrawnBody, Scene, frame_times
@@ -31,7 +30,6 @@ PAGE, REPLAY = "judged.html", "replay.html"
 MOST_PANELS, MOST_ROWS = 6, 500  # pairs with a drawing of their distance, and pairs in the table; `--json` has all
 NEAR = 2.0  # a pair came near if its least distance is below this multiple of the required one
 LONGEST_REPLAY_S = 1200.0  # of a longer log there is no replay: its page would be too large
-_BAND: dict[str, Any] = {"facecolor": "#eeeeee", "hatch": "///", "edgecolor": "#d4d4d4", "linewidth": 0.0, "zorder": 0}
 _MAP_IN, _PANEL_IN, _HEIGHT_IN = 6.0, 7.5, 2.1
 
 
@@ -129,7 +127,7 @@ def _distance(axes: Axes, pair: JudgedPair, course: Sequence[tuple[Array, Array]
     top = max(min(float(distances_m.max()), 4.0 * pair.safe_m), 1.3 * pair.safe_m)
     axes.set_xlim(judged.begin_s, max(judged.end_s, judged.begin_s + 1e-6))
     axes.set_ylim(bottom, top)
-    axes.axhspan(bottom, pair.safe_m, **_BAND)
+    axes.axhspan(bottom, pair.safe_m, **canvas.FORBIDDEN)
     for gap in pair.gaps_s:
         axes.axvspan(*gap, facecolor="#dddddd", zorder=0.2)
     level(axes, pair.safe_m, "-")
@@ -145,8 +143,7 @@ def _distance(axes: Axes, pair: JudgedPair, course: Sequence[tuple[Array, Array]
 def _table(pair: JudgedPair, over_time: Mapping[tuple[str, str], Sequence[tuple[Array, Array]]]) -> Table:
     course = over_time[pair.first, pair.second]
     t_s, values = (np.concatenate([stretch[k] for stretch in course]) for k in (0, 1))
-    rows = np.unique(np.linspace(0, len(t_s) - 1, MAX_TABLE_ROWS).round().astype(int))
-    cells = tuple((f"{t_s[k]:.2f}", f"{values[k]:.4f}") for k in rows)
+    cells = tuple((f"{t_s[k]:.2f}", f"{values[k]:.4f}") for k in spread(len(t_s)))
     return Table(f"{pair.first}, {pair.second}: distance between surfaces", ("t, s", "distance, m"), cells)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import LogError, one_line
+from airground_drake.base.errors import LogError
 
 Whole = npt.NDArray[np.int64]
 
@@ -67,7 +67,7 @@ class Stream:
         """Stamps in nanoseconds, (n,), if they are in a unit of time; LogError if 64 bits do not hold them."""
         per = 10**9 // PER_S[unit]
         if max(map(abs, map(int, (self.whole.min(initial=0), self.whole.max(initial=0))))) > (2**63 - 1) // per - 1:
-            raise LogError(one_line(f"{self.label} has times of more than 292 years; wanted: --time-unit, or seconds"))
+            raise LogError(f"{self.label} has times of more than 292 years; wanted: --time-unit, or seconds")
         return self.whole * per + self.nano * per // 10**9
 
     def elapsed_s(self, unit: str) -> Array:

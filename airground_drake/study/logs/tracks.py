@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array, Flags
-from airground_drake.base.errors import LogError, one_line
+from airground_drake.base.errors import LogError
 from airground_drake.check.files import Json
 from airground_drake.check.limits import LARGEST
 from airground_drake.check.scenario import expected_m_s, robots_of, uavs_of
@@ -115,9 +115,9 @@ def known(scenario: Json, choice: Choice, others: Sequence[str] = ()) -> None:
     there = bodies_of(scenario, choice.uavs)
     for name in (*choice.without, *others):
         if name not in there:
-            raise LogError(one_line(f"the scenario has no {name}; it has {', '.join(there)}"))
+            raise LogError(f"the scenario has no {name}; it has {', '.join(there)}")
     if taken := [name for name in choice.uavs if name in bodies_of(scenario) or name in scenario["obstacles"]]:
-        raise LogError(one_line(f"--uav {taken[0]}: the scenario has it already"))
+        raise LogError(f"--uav {taken[0]}: the scenario has it already")
 
 
 def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
@@ -126,7 +126,7 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     _in_one_frame({name: stream.frame for name, stream in streams.items()}, choice.frames)
     for name, stream in streams.items():
         if not (np.abs(np.nan_to_num(stream.places)) <= LARGEST * max(PER_M.values())).all():
-            raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
+            raise LogError(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres")
     axes.chosen(streams, choice.axes)
     said = units.settle(streams, scenario, choice.time_unit, choice.length_unit, choice.rate_hz)
     for name, letters in choice.axes.items():
@@ -139,7 +139,7 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
             for stream in log.streams:
                 if stream.skipped and not len(stream.whole) and _body_of(stream, bodies, choice.rename)[0] == name:
                     unusable = ", ".join(f"{n} with {why}{_where(stream, why)}" for why, n in stream.skipped.items())
-                    raise LogError(one_line(f"{name} has no usable rows: {unusable}; wanted: {_USABLE}"))
+                    raise LogError(f"{name} has no usable rows: {unusable}; wanted: {_USABLE}")
             raise LogError(_not_there(name, log, choice))
     if len(clocks := {stream.clock for stream in streams.values() if stream.clock in OF_MESSAGES}) > 1:
         late = ", ".join(name for name, stream in streams.items() if stream.clock == RECEIPT)
@@ -176,13 +176,13 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
 def _not_there(name: str, log: Log, choice: Choice) -> str:
     frames = sorted({stream.frame for stream in log.streams if stream.frame})
     if choice.frames and frames and not {*frames} & {*choice.frames}:
-        return one_line(f"--frame {choice.frames[0]}: the log has no such frame; it has {', '.join(frames)[:300]}")
+        return f"--frame {choice.frames[0]}: the log has no such frame; it has {', '.join(frames)[:300]}"
     there = ", ".join(dict.fromkeys(stream.label for stream in log.streams))
     there = f"names there: {there[:300]}" if there else "no positions are there"
     of_it = [why for why in log.unusable if name in why]
     likely = of_it or log.unusable or (log.ignored if not log.streams else [])
     lacks = f"; not usable: {', '.join(likely[:3])[:300]}" if likely else ""
-    return one_line(f"{name} is not in the log; {there}{lacks}; wanted: --rename NAME={name}, or --without {name}")
+    return f"{name} is not in the log; {there}{lacks}; wanted: --rename NAME={name}, or --without {name}"
 
 
 def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[str, Stream], list[str]]:
@@ -209,9 +209,7 @@ def _assigned(log: Log, bodies: Collection[str], choice: Choice) -> tuple[dict[s
             name = best[0].name if len({stream.name for stream in best}) > 1 else best[0].child
             frame = "--frame FRAME" if len({stream.frame for stream in best}) > 1 else ""
             wanted = ", or ".join(filter(None, [f"--rename {name}={body}" if name else "", frame]))
-            raise LogError(
-                one_line(f"{body} is in the log more than once: {', '.join(frames)[:400]}; wanted: {wanted}")
-            )
+            raise LogError(f"{body} is in the log more than once: {', '.join(frames)[:400]}; wanted: {wanted}")
         assigned[body] = _merged(best)
     return assigned, list(dict.fromkeys(ignored))
 
@@ -220,10 +218,10 @@ def _exist(rename: Mapping[str, str], log: Log, bodies: Collection[str]) -> None
     known = {name.strip("/") for stream in log.streams for name in (stream.name, stream.child, stream.label) if name}
     for name, body in rename.items():
         if body not in bodies:
-            raise LogError(one_line(f"--rename {name}={body}: the scenario has no {body}; it has {', '.join(bodies)}"))
+            raise LogError(f"--rename {name}={body}: the scenario has no {body}; it has {', '.join(bodies)}")
         if name.strip("/") not in known:
             there = ", ".join(sorted(known))[:300]
-            raise LogError(one_line(f"--rename {name}={body}: the log has no {name}; it has {there}"))
+            raise LogError(f"--rename {name}={body}: the log has no {name}; it has {there}")
 
 
 def _body_of(stream: Stream, bodies: Collection[str], rename: Mapping[str, str]) -> tuple[str, int]:
@@ -251,9 +249,7 @@ def _merged(streams: list[Stream]) -> Stream:
     first = streams[0]
     for other in streams[1:]:
         if (other.time_unit, other.length_unit, other.clock) != (first.time_unit, first.length_unit, first.clock):
-            raise LogError(
-                one_line(f"{first.label} has other units or clocks in {first.source} than in {other.source}")
-            )
+            raise LogError(f"{first.label} has other units or clocks in {first.source} than in {other.source}")
         first.whole, first.nano = np.append(first.whole, other.whole), np.append(first.nano, other.nano)
         first.places = np.concatenate([first.places, other.places])
         first.skipped += other.skipped
@@ -269,11 +265,12 @@ def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
         return
     if len({*stated.values()}) > 1:
         wanted = "wanted: positions in one frame, such as map or world; or --frame for each name of that one frame"
-        raise LogError(one_line(f"positions are in different frames: {several}; {wanted}"))
+        raise LogError(f"positions are in different frames: {several}; {wanted}")
     if len(frames) > 1 and stated and segments(next(iter(stated.values())))[-1] == "odom":
         wanted = "wanted: positions in one frame, such as map or world; or --frame odom if this is one for all"
-        raise LogError(one_line(f"odometry is in a frame of each robot's own, though both may be called odom: "
-                                f"{several}; {wanted}"))  # fmt: skip
+        raise LogError(
+            f"odometry is in a frame of each robot's own, though both may be called odom: {several}; {wanted}"
+        )
 
 
 def _where(stream: Stream, reason: str) -> str:
@@ -303,7 +300,7 @@ def _track(
     """The track of a stream, whose stamps are ns after time 0: sorted, each time once."""
     places = stream.places / PER_M[stream.length_unit]
     if not (np.abs(np.nan_to_num(places)) <= LARGEST).all():
-        raise LogError(one_line(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres"))
+        raise LogError(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres")
     for reason, count in stream.skipped.items():
         said.append(f"{name}: {count} rows skipped, {reason}{_where(stream, reason)}")
     _of_one_recording(name, ns, places, fastest_m_s)
@@ -319,9 +316,9 @@ def _track(
         said.append(f"{name}: {int(same.sum())} rows come twice; each counts once")
     if other.sum() > CONTRADICTORY * len(ns):
         raise LogError(
-            one_line(f"{name}: {int(other.sum())} of {len(ns)} rows are elsewhere at the same time as another row; "
-                     "wanted: stamps as fine as the rows, of one recording")
-        )  # fmt: skip
+            f"{name}: {int(other.sum())} of {len(ns)} rows are elsewhere at the same time as another row; "
+            "wanted: stamps as fine as the rows, of one recording"
+        )
     if other.any():
         k = int(np.argmax(np.where(other, apart, -1.0)))
         said.append(
@@ -361,9 +358,9 @@ def _of_one_recording(name: str, ns: Whole, places: Array, fastest_m_s: float) -
         step_s = float(np.median(np.diff(t))) / 1e9
         if np.median(apart) > LOST_M + step_s * fastest_m_s:
             raise LogError(
-                one_line(f"{name}: rows of two recordings of the same time, {float(np.median(apart)):.3g} m apart; "
-                         "wanted: one recording")
-            )  # fmt: skip
+                f"{name}: rows of two recordings of the same time, {float(np.median(apart)):.3g} m apart; "
+                "wanted: one recording"
+            )
 
 
 def _leaps(t_s: Array, places: Array, fastest_m_s: float) -> Flags:
@@ -404,9 +401,9 @@ def _apart_at_the_start(tracks: Mapping[str, Track], scenario: Json) -> None:
     starts = {tuple(ugvs[name]["start_m"][:2]) for name in there}
     if len(there) > 1 and len(starts) > 1:
         raise LogError(
-            one_line(f"{', '.join(there)} all start at (0, 0): each is in a frame of its own, as odometry is; "
-                     "wanted: positions in one frame, such as map or world")
-        )  # fmt: skip
+            f"{', '.join(there)} all start at (0, 0): each is in a frame of its own, as odometry is; "
+            "wanted: positions in one frame, such as map or world"
+        )
 
 
 def _heights(tracks: Mapping[str, Track], scenario: Json, said: list[str]) -> None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.base.errors import LogError, one_line
+from airground_drake.base.errors import LogError
 from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
 from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream, unit_since_1970
@@ -64,7 +64,7 @@ def settle(
             if unit not in ("", "s", "m") and not (unit == "ns" and stamps in OF_MESSAGES) and not rate_hz:
                 said[f"{what} are in {NAMES[unit]}, as the file says"] = None
         if stream.counts_frames and not (stated[0] or time_unit):
-            raise LogError(one_line(f"the times of {stream.label} are numbers of frames ({stream.clock}); {_WANTED}"))
+            raise LogError(f"the times of {stream.label} are numbers of frames ({stream.clock}); {_WANTED}")
         stream.time_unit = stream.time_unit or time_unit or _since_1970(stream, float(scenario["duration_s"]))
         stream.length_unit = stream.length_unit or length_unit
         if stream.time_unit in ("ms", "us", "ns") and not stated[0]:
@@ -95,7 +95,7 @@ def _of_frames(streams: Mapping[str, Stream], rate_hz: float) -> None:
         raise LogError("--rate-hz is for logs whose times are numbers of frames; this log has other times")
     for numbered in counted:
         if float(np.abs(numbered.whole / rate_hz).max(initial=0.0)) > 9e9:
-            raise LogError(one_line(f"{numbered.label} has numbers of frames beyond 9e9 s; wanted: another --rate-hz"))
+            raise LogError(f"{numbered.label} has numbers of frames beyond 9e9 s; wanted: another --rate-hz")
         numbered.whole, numbered.time_unit = np.round(numbered.whole * (1e9 / rate_hz)).astype(np.int64), "ns"
 
 
@@ -106,9 +106,9 @@ def _alike(streams: Mapping[str, Stream], length: str, scenario: Json) -> None:
         off = {unit: float(np.linalg.norm(stream.places[0, :2] / PER_M[unit] - start)) for unit in ("m", length)}
         if off["m"] <= NEAR_M and off[length] > 5.0 * NEAR_M:
             raise LogError(
-                one_line(f"lengths of {stream.label} fit {name}'s start in metres, others only fit in {NAMES[length]}; "
-                         "wanted: one unit for all, or units in the names of columns (x_mm)")
-            )  # fmt: skip
+                f"lengths of {stream.label} fit {name}'s start in metres, others only fit in {NAMES[length]}; "
+                "wanted: one unit for all, or units in the names of columns (x_mm)"
+            )
 
 
 def _since_1970(stream: Stream, duration_s: float) -> str:
@@ -141,10 +141,10 @@ def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str, li
         if not asked.is_possible or (time == "s" and long and slow) or (time != "s" and asked.speed > FAST):
             whole = next(stream for stream in streams.values() if not stream.time_unit)
             raise LogError(
-                one_line(f"the times of {whole.label} ({whole.clock}) are whole numbers that fit no unit: as seconds, "
-                         f"the log would last {moving['s', length].lasts_s:.6g} s; {_WANTED}, if they are numbers of "
-                         "frames, or --time-unit")
-            )  # fmt: skip
+                f"the times of {whole.label} ({whole.clock}) are whole numbers that fit no unit: as seconds, "
+                f"the log would last {moving['s', length].lasts_s:.6g} s; {_WANTED}, if they are numbers of "
+                "frames, or --time-unit"
+            )
     whys = []
     if time not in ("", "s"):
         lasts = f"the log would last {moving['s', length].lasts_s:.6g} s, and the scenario {scenario['duration_s']:g} s"

@@ -67,12 +67,7 @@ def assert_holds(trace: Trace, *claims: str | TraceClaim, exercised: bool = Fals
     _require(verdicts, f"on {place}", exercised=exercised)
 
 
-def assert_proved(
-    scenario: str | Path | Scenario,
-    *claims: str,
-    set: Overrides = (),
-    kept: Path | None = None,
-) -> None:
+def assert_proved(scenario: str | Path | Scenario, *claims: str, set: Overrides = (), kept: Path | None = None) -> None:
     """Assert that claims about the model are proved for a scenario's constants, or supported if they are statistical.
 
     Args:

@@ -18,6 +18,7 @@ robots and obstacles, plainer shapes, shorter runs, and the defaults of the sche
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import lru_cache
 from typing import TypeVar
 
@@ -25,7 +26,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from airground_drake.base.registry import METHODS, ROUTES
-from airground_drake.model.trigger.bayes import optimal_threshold
+from airground_drake.model.trigger import bayes
 from airground_drake.scenario import schema
 
 T = TypeVar("T")
@@ -300,13 +301,10 @@ def _decisions(draw: DrawFn, period: float, triggers: SearchStrategy[str] | None
     """A trigger with its threshold, a release level below it, and noise with a period of its own."""
     fixed = first_of(3.0, 1.0, 0.5, 0.1).map(lambda zeta: schema.Threshold(zeta_m=zeta))
     threshold = draw(st.one_of(fixed, st.sampled_from(BAYES)))
-    zeta = threshold.zeta_m
-    if threshold.rule == "bayes":
-        zeta = optimal_threshold(threshold.drift_m_s, threshold.noise_m_sqrt_s, threshold.c1_1_s, threshold.c2)
     return schema.Decision(
         threshold=threshold,
         trigger=draw(first_of(*schema.TRIGGERS) if triggers is None else triggers),
-        release_m=zeta * draw(first_of(0.5, 0.1, 0.9)),
+        release_m=bayes.threshold(**asdict(threshold)) * draw(first_of(0.5, 0.1, 0.9)),
         min_inter_event_s=draw(first_of(0.5, 0.0, 0.05, 2.0)),
         noise_m_sqrt_s=draw(first_of(0.0, 0.004, 0.1)),
         leak_1_s=draw(first_of(0.0, 0.5)),

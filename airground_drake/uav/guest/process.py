@@ -134,7 +134,7 @@ class GuestPolicy(Policy):
             self._used = LIVES if limit_s >= START_S else self._used
             raise PolicyError(f"OutOfTime: not done after {limit_s:g} s")
         if fault:
-            raise PolicyError(one_line(f"its process sent no message: {fault}"[:FAULT_WIDTH]))
+            raise PolicyError(f"its process sent no message: {fault}"[:FAULT_WIDTH])
         raise PolicyError(f"its process ended or closed its channel ({ended_how(self._process.returncode)})")
 
 

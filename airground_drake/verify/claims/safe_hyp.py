@@ -519,10 +519,8 @@ def least_shares(trace: Trace) -> list[dict[str, Any]]:
     """The least share s that was left of each command that is shortened, 1 in full, and the gain s A of recoveries."""
     gain = trace.scenario.control.avoidance_gain_1_s
     names = [ugv for ugv in trace.ugvs if trace.plant(ugv).steering is not None]
-    shares = [float(trace.sampled(f"{name}.command_share").min()) for name in names]
-    return [
-        {"robot": name, "share": share, "gain_1_s": share * gain} for name, share in zip(names, shares, strict=True)
-    ]
+    shares = {name: float(trace.sampled(f"{name}.command_share").min()) for name in names}
+    return [{"robot": name, "share": share, "gain_1_s": share * gain} for name, share in shares.items()]
 
 
 def own_plants(trace: Trace) -> list[dict[str, Any]]:

@@ -1,7 +1,7 @@
 """SAFE-OWN: what the robots themselves did to the distances of a run in which obstacles may move."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -72,7 +72,7 @@ class SafeOwn(TraceClaim):
             unit="m" if worst else "",
             quantity="least distance from the other body held, less min(D, d + V h)" if worst else "",
             where=worst._asdict() if worst else {},
-            counterexample=_against(trace, worst) if worst and own else None,
+            counterexample=worst._asdict() | snapshot(trace, worst[:2], worst.t_s) if worst and own else None,
             evidence={
                 "robots_beside_others": [own._asdict() for own in margins[:MOST_LISTED]],
                 "tolerance_m": DISTANCE_TOLERANCE_M,
@@ -102,7 +102,3 @@ def _margins(trace: Trace) -> Iterator[OwnMargin]:
             k = int(np.argmin(margins))  # the first one that is not a number, if there is any
             if margins[k] != np.inf:
                 yield OwnMargin(robot, other, float(margins[k]), float(trace.t[k + 1]))
-
-
-def _against(trace: Trace, worst: OwnMargin) -> dict[str, Any]:
-    return worst._asdict() | snapshot(trace, (worst.first, worst.second), worst.t_s)

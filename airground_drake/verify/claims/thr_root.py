@@ -1,13 +1,14 @@
 """THR-ROOT: the Bayes threshold as the one root of (19) (coq/Threshold.v), enclosed by two signs."""
 
+from dataclasses import asdict
 from fractions import Fraction
 from typing import Any
 
 from airground_drake.base.exact import decimal
-from airground_drake.model.trigger.bayes import optimal_threshold
+from airground_drake.model.trigger.bayes import optimal_threshold, threshold
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.engines.signs import RootInterval, ThresholdRule, value
-from airground_drake.verify.model.levels import NUMBERS, threshold_m
+from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 # The program's threshold may be this far outside its enclosure, relative to it: rounding errs by some 1e-15.
@@ -43,7 +44,7 @@ class ThrRoot(TheoremClaim):
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         rule = scenario.decision.threshold
         numbers = {name: getattr(rule, name) for name in NUMBERS}
-        return {"rule": rule.rule, **numbers, "zeta_m": threshold_m(scenario)}
+        return {"rule": rule.rule, **numbers, "zeta_m": threshold(**asdict(rule))}
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         rule = rule_of(inputs)
@@ -95,7 +96,4 @@ def two_signs(what: str, ends: RootInterval) -> list[Hypothesis]:
 
 def as_floats(rule: ThresholdRule, root: RootInterval, prefix: str = "") -> dict[str, list[float]]:
     """The enclosures of u and of the threshold, m."""
-    return {
-        f"{prefix}u": [float(u) for u in root[:2]],
-        f"{prefix}zeta_m": [float(rule.zeta(u)) for u in root[:2]],
-    }
+    return {f"{prefix}u": [float(u) for u in root[:2]], f"{prefix}zeta_m": [float(rule.zeta(u)) for u in root[:2]]}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
 from itertools import pairwise, zip_longest
 from typing import Any, NamedTuple
 
@@ -38,8 +37,6 @@ VARIABLE_TOLERANCE_M = 1e-6
 
 # Mode after each kind of transition: 'refractory' is a release before the dwell is over, 'resume' the end of it.
 MODES = {"trigger": 1, "release": 0, "refractory": 2, "resume": 0}
-
-# Why no crossing in a step is missed.
 
 # Event that the trace has for a transition.
 EVENT_KINDS = {"trigger": "trigger", "release": "release", "refractory": "release"}
@@ -110,7 +107,7 @@ class ThrTrig(TraceClaim):
         wrong = [*_of_strangers(trace), *(conflict for ugv in judged for conflict in ugv.wrong)]
         due = Counter(kind for ugv in judged for kind in _as_transitions(ugv.predicted))
         replayed = [ugv.evidence for ugv in judged]
-        lags = [(ugv.worst_time_difference_s, ugv.robot) for ugv in replayed if ugv.events]
+        lags = [(found["worst_time_difference_s"], found["robot"]) for found in replayed if found["events"]]
         worst = max(lags) if lags and not wrong else None
         return Finding(
             "refuted" if wrong else "holds",
@@ -120,7 +117,7 @@ class ThrTrig(TraceClaim):
             where={"robot": worst[1]} if worst else {},
             counterexample=min(wrong, key=lambda conflict: float(conflict["t_s"])) if wrong else None,
             evidence={
-                "ugvs": [asdict(ugv) for ugv in replayed],
+                "ugvs": replayed,
                 "decision_block": _block(trace) or "that of (15)",
                 **levels._asdict(),
                 "transitions_due": dict(due),
@@ -162,9 +159,7 @@ def levels_by(decision: Decision, zeta: float) -> TriggerLevels:
         raise TraceError(f"the threshold in force, {zeta} m, is not the scenario's")
     if rule.rule != "fixed" and not _is_root(rule, zeta):
         raise TraceError(f"the threshold in force, {zeta} m, is not what the scenario's rule computes")
-    if decision.trigger == "bare":
-        return TriggerLevels(zeta, zeta, 0.0)
-    return TriggerLevels(zeta, decision.release_m, decision.min_inter_event_s)
+    return TriggerLevels(*decision.levels(zeta))
 
 
 def _block(trace: Trace) -> str:
@@ -180,23 +175,12 @@ def _of_strangers(trace: Trace) -> Iterator[Conflict]:
             yield {"robot": str(event["robot"]), "t_s": float(event["t_s"]), "what": what}
 
 
-@dataclass(frozen=True)
-class Replayed:
-    """Evidence about the trigger of a UGV: `events` are those that the trace must have, with `t_s` and `kind`."""
-
-    robot: str
-    events: list[dict[str, Any]]
-    worst_time_difference_s: float
-    largest_decision_variable_m: float
-    port_against_15: dict[str, Any]
-
-
 class Reconstruction(NamedTuple):
-    """The trigger of a UGV, run again: the evidence, the automaton's transitions, and all that disagrees."""
+    """The trigger of a UGV, run again."""
 
-    evidence: Replayed
-    predicted: list[Transition]
-    wrong: list[Conflict]
+    evidence: dict[str, Any]  # `events` are those that the trace must have
+    predicted: list[Transition]  # the automaton's
+    wrong: list[Conflict]  # all that disagrees
 
 
 def _judged(trace: Trace, ugv: str, levels: TriggerLevels) -> Reconstruction:
@@ -209,13 +193,13 @@ def _judged(trace: Trace, ugv: str, levels: TriggerLevels) -> Reconstruction:
     columns = column_conflict(trace, ugv, recorded)
     modes = _mode_conflict(trace, ugv, predicted)
     conflicts = (off, mismatch, columns, modes, noise_conflict(trace, ugv))
-    evidence = Replayed(
-        robot=ugv,
-        events=[{"t_s": time, "kind": kind} for time, kind in expected],
-        worst_time_difference_s=lag,
-        largest_decision_variable_m=float(x.x.max()),
-        port_against_15=against_15,
-    )
+    evidence = {
+        "robot": ugv,
+        "events": [{"t_s": time, "kind": kind} for time, kind in expected],
+        "worst_time_difference_s": lag,
+        "largest_decision_variable_m": float(x.x.max()),
+        "port_against_15": against_15,
+    }
     wrong = [{"robot": ugv, **conflict} for conflict in conflicts if conflict is not None]
     return Reconstruction(evidence, predicted, wrong)
 

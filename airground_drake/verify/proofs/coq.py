@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from airground_drake.base import files
-from airground_drake.base.errors import AirgroundError, one_line
+from airground_drake.base.errors import AirgroundError
 from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, RECORD, closure, digest, file_of, read_record
 from airground_drake.verify.proofs.theorems import FOLDER, THEOREMS
 
@@ -25,7 +25,7 @@ class CoqError(AirgroundError):
     """Coq does not accept a file, or a theorem rests on more than is allowed."""
 
     def __init__(self, message: str, line: int = 0) -> None:
-        super().__init__(one_line(message))
+        super().__init__(message)
         self.line = line  # of the file, from 1; 0 if unknown
 
 
@@ -40,7 +40,7 @@ def version() -> str:
             raise NoCoqError(f"{tool} is not on the PATH: install Coq (Debian, Ubuntu: apt-get install coq)")
     said = _run(["coqc", "--print-version"], Path.cwd(), 60.0)
     if said.returncode or not said.stdout.split():
-        raise NoCoqError(one_line(f"coqc does not run: {said.stderr.strip() or said.returncode}"))
+        raise NoCoqError(f"coqc does not run: {said.stderr.strip() or said.returncode}")
     return said.stdout.split()[0]
 
 
@@ -131,7 +131,7 @@ def _run(command: list[str], folder: Path, limit_s: float) -> subprocess.Complet
     except subprocess.TimeoutExpired:
         raise CoqError(f"{command[0]} {command[-1]} took longer than {limit_s:g} s") from None
     except OSError as error:
-        raise NoCoqError(one_line(f"{command[0]} does not start: {error.strerror}")) from None
+        raise NoCoqError(f"{command[0]} does not start: {error.strerror}") from None
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from airground_drake.base import files
-from airground_drake.base.errors import TraceError, UnknownNameError, one_line
+from airground_drake.base.errors import TraceError, UnknownNameError
 from airground_drake.base.registry import DISTANCES
 from airground_drake.base.statuses import NOTHING, declared
 from airground_drake.sim.trace import Trace, load
@@ -61,14 +61,9 @@ class Proved:
     """The result for one run."""
 
     run: str  # its identifier
-    expected: bool  # whether the scenario expects its distances to be kept
-    pairs: int  # number of pairs
-    lawful: int  # number of pairs whose law is judged
-    rows: int  # of the trace
+    about: Mapping[str, Any]  # see `_about_run`
     distances: CoqReply  # every pair keeps its full distance at all times
-    law: CoqReply  # those pairs obey the avoidance law, without error
-    rounded: readback.RereadError  # coordinates that were rounded, and by how much at most, m
-    meta_sha256: str  # of the run's trace/<run>/meta.json
+    law: CoqReply  # the lawful pairs obey the avoidance law, without error
 
 
 @dataclass(frozen=True)
@@ -99,13 +94,18 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
     if distances.refused and (near := too_near(exact)):
         words = f"Coq refuses {_pair(distances.refused)}. In exact arithmetic {'; '.join(map(str, near))}"
         distances = replace(distances, why=words, too_near=near)
-    lawfully = recorded(run, steered=True) if exact.off_m else exact
-    table = entries(lawfully)
-    alone = not distances.proved or lawfully is not exact
-    text = law_file(lawfully, table, alone=alone) if table else ""
-    if table and alone:
+    lawfully, table, text = _law(run, exact, proved=distances.proved)
+    if table and not (distances.proved and lawfully is exact):
         readback.compare_positions(text, run, steered=lawfully is not exact)
     return distances, _decide_law(place, lawfully, table, text, limit_s), rounded
+
+
+def _law(run: Trace, exact: Recorded, *, proved: bool) -> tuple[Recorded, list[Entry], str]:
+    """The record of the points that the law steers, its table, and the file about it; '' without an entry."""
+    # proved: whether Coq accepts the file about distances: then the file about the law may take positions from there.
+    lawfully = recorded(run, steered=True) if exact.off_m else exact
+    table = entries(lawfully)
+    return lawfully, table, law_file(lawfully, table, alone=not proved or lawfully is not exact) if table else ""
 
 
 def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: str, limit_s: float) -> CoqReply:
@@ -132,7 +132,7 @@ def _usable(run: Trace) -> Iterator[None]:
     try:
         yield
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise TraceError(one_line(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}")) from None
+        raise TraceError(f"run {run.run}: the scenario in meta.json cannot be used: {error!r}") from None
 
 
 def decide(place: Workshop, run: Recorded, name: str, text: str, theorem: str, limit_s: float) -> CoqReply:
@@ -180,12 +180,23 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
                 (report / PLACE / answer.file).unlink(missing_ok=True)
                 if (place.folder / answer.file).exists():
                     files.write_bytes(report / PLACE / answer.file, (place.folder / answer.file).read_bytes())
-            meta = files.sha256(files.read_bytes(report / "trace" / name / "meta.json"))
-            asked = demands_of(run)
-            counts = len(asked), len(lawful(asked)), len(run.t)
-            answers.append(Proved(name, expects_kept(run), *counts, distances, law, rounded, meta))
+            answers.append(Proved(name, _about_run(report, run, rounded), distances, law))
             yield answers[-1]
         files.write_json(report / PLACE / FOUND, document(place, answers))
+
+
+def _about_run(report: Path, run: Trace, rounded: readback.RereadError) -> dict[str, Any]:
+    """What proofs.json says of a run of a report besides Coq's answers."""
+    asked = demands_of(run)
+    return {
+        "expected": expects_kept(run),
+        "meta_sha256": files.sha256(files.read_bytes(report / "trace" / run.run / "meta.json")),
+        "rows": len(run.t),
+        "pairs": len(asked),
+        "lawful_pairs": len(lawful(asked)),  # whose law is judged
+        "rounded_coordinates": rounded.coordinates,
+        "rounded_by_m": rounded.most_m,
+    }
 
 
 def expects_kept(run: Trace) -> bool:
@@ -200,17 +211,7 @@ def document(place: Workshop, answers: Sequence[Proved]) -> dict[str, Any]:
         "coq": place.coq,
         "theory": dict(place.theory),
         "runs": {
-            proved.run: {
-                "expected": proved.expected,
-                "meta_sha256": proved.meta_sha256,
-                "rows": proved.rows,
-                "pairs": proved.pairs,
-                "lawful_pairs": proved.lawful,
-                "rounded_coordinates": proved.rounded.coordinates,
-                "rounded_by_m": proved.rounded.most_m,
-                "distances": _entry(proved.distances),
-                "law": _entry(proved.law),
-            }
+            proved.run: {**proved.about, "distances": _entry(proved.distances), "law": _entry(proved.law)}
             for proved in answers
         },
     }
@@ -265,20 +266,11 @@ def _broken(folder: Path, record: Mapping[str, Any], traces: Mapping[str, Trace]
         if name not in record["runs"]:
             continue
         exact, entry = recorded(trace), record["runs"][name]
-        lawfully = recorded(trace, steered=True) if exact.off_m else exact
-        table, near = entries(lawfully), too_near(exact)
-        alone = not entry["distances"]["proved"] or lawfully is not exact
-        law = law_file(lawfully, table, alone=alone) if table else ""
+        kept, near = entry["distances"]["proved"], too_near(exact)
+        lawfully, table, law = _law(trace, exact, proved=kept)
         of_run = {f"{exact.name}.v": distances_file(exact, vectors=False), f"{lawfully.name}_law.v": law}
         texts |= of_run
-        meta = files.sha256(files.read_bytes(folder.parent / "trace" / name / "meta.json"))
-        kept = entry["distances"]["proved"]
-        rounding = readback.compare(texts[f"{exact.name}.v"], trace)
-        expected = {
-            "meta_sha256": meta, "expected": expects_kept(trace), "rows": len(trace.t), "pairs": len(exact.demands),
-            "lawful_pairs": len(lawful(exact.demands)), "rounded_coordinates": rounding.coordinates,
-            "rounded_by_m": rounding.most_m,
-        }  # fmt: skip
+        expected = _about_run(folder.parent, trace, readback.compare(texts[f"{exact.name}.v"], trace))
         yield from _unless(f"{name}: keys", sorted({*expected, "distances", "law"}), sorted(entry))
         for key, value in expected.items():
             yield from _unless(f"{name}.{key}", value, entry[key])

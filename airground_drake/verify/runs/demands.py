@@ -11,13 +11,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.engines.outlines import (
-    CORNERS,
-    COUNT,
-    EXTENT,
-    MIDDLE,
-    unpacked,
-)
+from airground_drake.verify.engines.outlines import CORNERS, COUNT, EXTENT, MIDDLE, unpacked
 from airground_drake.verify.runs.control_law import ON_TOP
 from airground_drake.verify.runs.old_positions import unsure_s
 from airground_drake.verify.runs.pairs import carried, declared_pairs, pairs_beside, parts_of

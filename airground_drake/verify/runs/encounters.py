@@ -245,9 +245,8 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) 
     names = dict[str, None]()
     if held.any():
         end = int(np.flatnonzero(held)[-1])
-        begin = int(
-            np.flatnonzero(~np.append(False, held[:end]))[-1]
-        )  # after the last period before in which it was free
+        # after the last period before in which it was free
+        begin = int(np.flatnonzero(~np.append(False, held[:end]))[-1])
         ends = np.append(trace.t[periods.row], t_s)
         caught = float(ends[begin]), float(min(ends[end + 1], max(t_s, ends[end])))
         names = dict.fromkeys(name for of_period in blocked[begin : end + 1] for name in of_period)

@@ -21,14 +21,7 @@ from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance, p
 from airground_drake.scenario.schema import MAP, Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace, per_trace
-from airground_drake.verify.engines.geometry import (
-    MERGE_S,
-    Approach,
-    apart_at_least,
-    boxes_of,
-    instant_of,
-    interpolate,
-)
+from airground_drake.verify.engines.geometry import MERGE_S, Approach, apart_at_least, boxes_of, instant_of, interpolate
 from airground_drake.verify.engines.outlines import (
     Away,
     Contacts,

@@ -170,7 +170,7 @@ def test_what_an_agent_proposes_is_checked_like_any_proposal() -> None:
 
 def test_policies_are_asked_once_at_each_instant_and_again_with_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     asked, plan = list[float](), Planner.plan
-    monkeypatch.setattr(Planner, "plan", lambda self, before, t, *rest: asked.append(t) or plan(self, before, t, *rest))
+    monkeypatch.setattr(Planner, "plan", lambda self, before, now: asked.append(now.t) or plan(self, before, now))
     env = InterventionEnv(load("minimal"))
     env.reset(options={"number": 1})
     over = False
