@@ -143,6 +143,10 @@ class Registry:
             why = _misfit(kind, parameters) or described(error)
             raise PluginError(f"{self.kind} {name!r} with {parameters}: {why}") from None
 
+    def misfit(self, name: str, parameters: Mapping[str, Any]) -> str:
+        """Why the class refuses these parameters, and which it takes; '' if it takes them, or is third-party."""
+        return "" if self.is_foreign(name) else _misfit(self.load(name, object), parameters)
+
     @contextmanager
     def adding(self, name: str, what: type) -> Iterator[None]:
         """Register a class under a name within a block (in a notebook, a benchmark or a test)."""

@@ -18,7 +18,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.exact import decimal, is_multiple
-from airground_drake.base.registry import ARRIVAL, METHODS, MODEL_CLAIMS, ROUTES, RUN_CLAIMS
+from airground_drake.base.registry import ARRIVAL, METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS
 from airground_drake.base.statuses import COUNTS, NOTHING, alternatives
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.plants.plant import Setting
@@ -63,6 +63,14 @@ def _uavs(scenario: Scenario) -> Problems:
             yield f"uavs.{name}.name", uav.name, f"{name}, its key, or no name"
     if len(scenario.aerial) > 1 and not scenario.safe_distance.uav_m:
         yield "safe_distance.uav_m", Fault("missing"), "wanted: the distance between two UAVs, a number above 0 in m"
+
+
+def _policies(scenario: Scenario) -> Problems:
+    """Policies of the package take their parameters."""
+    for k, policy in enumerate(scenario.intervention.policies):
+        why, _, takes = POLICIES.misfit(policy.name, policy.parameters).partition("; ")
+        if why:
+            yield f"intervention.policies.{k}.parameters", Fault(why), takes
 
 
 def _charges(scenario: Scenario) -> Problems:
@@ -649,7 +657,7 @@ def _keys(value: object, above: str = "") -> Iterator[str]:
 
 # Every rule; later ones rely on earlier ones.
 CHECKS: tuple[Callable[[Scenario], Problems], ...] = (
-    _uavs, _names, _reserved, _charges, _bursts, _ugv_links, _shapes, _map, _blocks, _route, _runs, _plants,
+    _uavs, _names, _reserved, _policies, _charges, _bursts, _ugv_links, _shapes, _map, _blocks, _route, _runs, _plants,
     _presets, _ends, _gains, _periods, _release, _distances, _sensing, _extent, _clearances, _standing, _faults,
     _measured, _budget, _asynchronous, _reproduction, _choices,
 )  # fmt: skip

@@ -170,7 +170,7 @@ report minimal --limit-memory nan       # a number above 0, at most 1e+15
 report no_such_scenario                 # case_a
 report minimal --set no.such=1          # no
 report case_a --set intervention.policies.0.name=teleport # teleport
-run case_a d --set intervention.policies.0.parameters.warp=9 # warp
+report case_a --set intervention.policies.0.parameters.warp=9 # allowed: speed_m_s (needed), clearance_m
 report case_a --set decision.noise_period_s=1e-9 # allowed: 1e+07 steps, 8 GiB
 report case_a --limit-steps 100 --limit-memory 0.1 # allowed: 1e+02 steps, 0.1 GiB
 report minimal --seed x                 # invalid int value: 'x'
