@@ -267,7 +267,7 @@ def start_margin(trace: Trace, pair: Pair) -> float:
 
 def at_appearance(trace: Trace, gap: Gap) -> bool:
     """Whether the gap of a pair was smallest when its obstacle appeared."""
-    return gap.pair.row > 0 and gap.t_s <= trace.t[gap.pair.row]
+    return bool(gap.pair.row > 0 and gap.t_s <= trace.t[gap.pair.row])
 
 
 @per_trace
