@@ -5,6 +5,7 @@ The fate of a message follows from the scenario alone, so no run is simulated fo
 
 import math
 from collections.abc import Iterator
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -25,8 +26,8 @@ Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and 
 
 def impossible(trace: Trace, scenario: Scenario) -> Iterator[Line]:
     """A line for the first thing that cannot have been so."""
-    for of in (_referred, _spoken, _carried, _heard, _executed):
-        for about, t_s, theirs, ours in of(trace, scenario):
+    for rule in (_referred, _spoken, _carried, _heard, _executed):
+        for about, t_s, theirs, ours in rule(trace, scenario):
             yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
             return
 
@@ -50,8 +51,8 @@ def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
         uav, ugv = (row["receiver"], row["sender"]) if row["kind"] == "answer" else (row["sender"], row["receiver"])
         of_uav, t_s, number = scenario.aerial.get(uav), row["sent_s"], int(row["number"])
         if of_uav is None or ugv not in scenario.in_charge(uav) or not 0.0 <= t_s <= trace.t[-1]:
-            said = f"{row['sender']} to {row['receiver']}, at {t_s:.9g} s"
-            yield f"who sends {row['kind']} {number}", 0.0, said, "a UAV and one of its UGVs, in the run"
+            said = f"{row['sender']} to {row['receiver']}"
+            yield f"who sends {row['kind']} {number}", t_s, said, "a UAV and one of its UGVs, in the run"
             continue
         by_uav, until_s = row["read_s"] if row["kind"] == "answer" else t_s, of_uav.lost_at_s or math.inf
         if by_uav >= until_s - SAME_S:
@@ -107,14 +108,17 @@ def _heard(trace: Trace, scenario: Scenario) -> Wrong:
     if channel is None or links is None or not (links.loss or scenario.asynchronous):
         return
     n, h = len(trace.ugvs), scenario.control.period_s
-    last = np.zeros((n, n))
-    for k, t in enumerate(trace.sampled("t_s").tolist()):
+    t_s, last = trace.sampled("t_s"), np.zeros((n, n))
+    due = np.empty((len(t_s), n, n))
+    for k, t in enumerate(t_s):
         if k >= late:
             last[~lost(channel.seed, links.loss, n, k - late)] = t - late * h
-        for i, j in zip(*np.nonzero(~np.eye(n, dtype=np.bool_)), strict=True):
-            heard_s = trace.sampled(f"{trace.ugvs[i]}.heard_{trace.ugvs[j]}_s")[k]
-            if abs(heard_s - last[i, j]) > SAME_S:
-                yield f"last position of {trace.ugvs[j]} that {trace.ugvs[i]} has", t, float(heard_s), float(last[i, j])
+        due[k] = last
+    for i, j in permutations(range(n), 2):
+        receiver, sender = trace.ugvs[i], trace.ugvs[j]
+        theirs, ours = trace.sampled(f"{receiver}.heard_{sender}_s"), due[:, i, j]
+        for k in np.flatnonzero(~(np.abs(theirs - ours) <= SAME_S))[:1]:
+            yield f"last position of {sender} that {receiver} has", float(t_s[k]), float(theirs[k]), float(ours[k])
 
 
 def _executed(trace: Trace, scenario: Scenario) -> Wrong:

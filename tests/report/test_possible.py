@@ -1,4 +1,4 @@
-"""Messages, positions heard, executions and references that a run cannot have had; an honest run has none."""
+"""What a run cannot have had is refused: messages, positions heard, executions, references."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -44,8 +44,8 @@ def first(**cells: Any) -> Callable[[pd.DataFrame], Any]:
     """The first row with these cells."""
 
     def rows(frame: pd.DataFrame) -> Any:
-        found = np.logical_and.reduce([frame[name] == value for name, value in cells.items()])
-        return np.arange(len(frame)) == int(np.argmax(found))
+        have = np.logical_and.reduce([frame[name] == value for name, value in cells.items()])
+        return np.arange(len(frame)) == int(np.argmax(have))
 
     return rows
 
@@ -56,11 +56,11 @@ def only(table: str, keep: Callable[[pd.DataFrame], Any]) -> Any:
 
 def earlier(trace: Trace) -> Trace:
     """A proposal is executed three samples earlier, and the decisions say so, too."""
-    one = trace.decisions[trace.decisions["decision"] == "accept"].iloc[0]
-    name, samples = f"{one['robot']}.executing", trace.samples.copy()
-    k = int(np.argmax(samples[name] == one["number"]))
-    samples.loc[k - 3 : k, name] = one["number"]
-    before = [one.to_dict() | {"t_s": trace.sampled("t_s")[j]} for j in range(k - 3, k)]
+    accepted = trace.decisions[trace.decisions["decision"] == "accept"].iloc[0]
+    name, samples = f"{accepted['robot']}.executing", trace.samples.copy()
+    k = int(np.argmax(samples[name] == accepted["number"]))
+    samples.loc[k - 3 : k, name] = accepted["number"]
+    before = [accepted.to_dict() | {"t_s": trace.sampled("t_s")[j]} for j in range(k - 3, k)]
     decisions = pd.concat([pd.DataFrame(before), trace.decisions])
     return replace(trace, samples=samples, decisions=decisions)
 
