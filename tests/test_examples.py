@@ -172,8 +172,8 @@ def test_a_learned_policy_is_trained_and_helps(monkeypatch: pytest.MonkeyPatch) 
     both = np.array([learned.START, json.loads(learned.WEIGHTS.read_text())])
     untrained, trained = np.mean([row for row in (learned.returns(both, number) for number in range(8)) if row], axis=0)
     assert trained > untrained + 3.0
-    scenario = load("minimal", {"intervention.policies": [{"name": "learned_policy:Learned",
-                                                           "parameters": {"speed_m_s": 3.0}}]})  # fmt: skip
+    policy = {"name": "learned_policy:Learned", "parameters": {"speed_m_s": 3.0}}
+    scenario = load("minimal", {"intervention.policies": [policy], "intervention.budget_s": 60.0})  # of a busy machine
     trace = simulate(scenario, "d")
     assert [event["t_s"] for event in trace.events if event["kind"] == "arrival" and event["robot"] == "ugv1"]
 
