@@ -93,22 +93,28 @@ def test_runs_in_several_processes_are_those_in_one(
 
 WARM_UP = """
 from airground_drake.sim import simulation
-from airground_drake.ugv import cost, outcome, relaxation, rollout
+from airground_drake.ugv import cost, outcome, plan_search, relaxation, rollout
+from airground_drake.model.geometry import convex
 from airground_drake.model.law import kernels, ugv_law
+from airground_drake.model.trigger import excursion
 from airground_drake.scenario.load import load
 
+OF_DECISIONS = (kernels, ugv_law, rollout, cost, outcome, relaxation)
 
-def compiled():
-    modules = (kernels, ugv_law, rollout, cost, outcome, relaxation)
+
+def compiled(modules):
     functions = [(f.__qualname__, f) for module in modules for f in vars(module).values() if hasattr(f, "signatures")]
     return {name: list(map(str, f.signatures)) for name, f in functions}
 
 
 simulation.warm_up()
-before = compiled()
+needed = compiled([*OF_DECISIONS, plan_search, convex, excursion])
+simulation.warm_up_beside()
+assert compiled([*OF_DECISIONS, plan_search, convex, excursion]) == needed, "what is compiled beside is not needed"
+before = compiled(OF_DECISIONS)
 for method in "cd":
     simulation.simulate(load("case_a"), method)
-assert before and compiled() == before, (before, compiled())
+assert before and compiled(OF_DECISIONS) == before, (before, compiled(OF_DECISIONS))
 """
 
 
