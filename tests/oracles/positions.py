@@ -89,12 +89,12 @@ def wrong_positions(trace: Trace) -> list[Fault]:
     """Without errors a UGV is announced a step of its command from where it was."""
     if not trace.scenario.announces or trace.scenario.sensing:
         return []
-    found = list[Fault]()
+    faults = list[Fault]()
     t = trace.sampled("t_s")
     for ugv in trace.ugvs:
         place: Array = trace.position(ugv)[trace.sample_rows]
         due = np.concatenate([place[:1], place[:-1] + trace.scenario.control.period_s * trace.chosen(ugv)[:-1]])
         off = np.linalg.norm(trace.as_seen(ugv, ugv) - due, axis=1)
         if (off > SAME_M).any():
-            found.append(Fault("announced otherwise", ugv, float(t[int(np.argmax(off > SAME_M))]), float(off.max())))
-    return found
+            faults.append(Fault("announced otherwise", ugv, float(t[int(np.argmax(off > SAME_M))]), float(off.max())))
+    return faults

@@ -33,7 +33,7 @@ class Corners(NamedTuple):
     first: npt.NDArray[np.int64]  # rows of each UGV's own vertices: from `first[j]` to before `first[j + 1]`, (n + 1,)
     own_times: Array  # their times, (C,), s
     places: Array  # and places, (C, 3), m
-    slopes: Array  # velocities from each of them to the next, (C, 3), m/s; the last of each UGV has none
+    slopes: Array  # velocity from each place to the next, (C, 3), m/s; 0 at the last place of each UGV
 
     @classmethod
     def of(cls, presets: Sequence[Motion]) -> Corners:

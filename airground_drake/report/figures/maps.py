@@ -133,8 +133,8 @@ def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
     arrived = events_of(trace, ugv, "arrival")
     words = [f"arrived at {_s(arrived[-1]['t_s'], 1)}"] if arrived else [told(others[-1:])] if others else []
     answers = {what: len(of) for what, of in grouped((mark.what, mark) for mark in sent).items()}
-    each = ", ".join(f"{n} {what}" for what, n in answers.items())
-    listed = f": {each}" if len(answers) > 1 else f", all {''.join(answers)}"
+    numbers = ", ".join(f"{n} {what}" for what, n in answers.items())
+    listed = f": {numbers}" if len(answers) > 1 else f", all {''.join(answers)}"
     words += [f"{len(sent)} proposals{listed}, the last {told(sent[-1:])}"] if len(sent) > 1 else []
     words += [f"proposal {told(sent)}"] if len(sent) == 1 else []
     return Entry("", f"{short(ugv)} {'; '.join(words)}", [*others, *sent[-1:]])

@@ -157,11 +157,9 @@ def without_proposals(trace: Trace) -> list[str]:
 
 def unreached(trace: Trace) -> set[str]:
     """UGVs none of whose proposals arrived in time for a decision."""
-    sent, last_s = (
-        trace.messages[trace.messages["kind"] == "proposal"],
-        trace.t[-1] - trace.scenario.gatekeeper.period_s,
-    )
-    return {*sent["receiver"]} - {*sent.loc[sent["received_s"] <= last_s, "receiver"]}
+    sent = trace.messages[trace.messages["kind"] == "proposal"]
+    in_time = sent["received_s"] <= trace.t[-1] - trace.scenario.gatekeeper.period_s
+    return {*sent["receiver"]} - {*sent.loc[in_time, "receiver"]}
 
 
 def lost_at_the_end(trace: Trace) -> list[str]:
