@@ -115,6 +115,9 @@ def test_without_a_channel_answers_are_those_of_decisions_and_a_lost_uav_is_sile
     assert [*impossible(honest, honest.scenario)] == []
     (line,) = impossible(only("decisions", lambda f: f[f["answer"] < 0])(honest), honest.scenario)
     assert line["about"].startswith("sending of answer ")
+    tables = {name: getattr(honest, name).replace({"sender": {"south": "north"}}) for name in ("messages", "proposals")}
+    (line,) = impossible(replace(honest, **tables), honest.scenario)
+    assert line["about"].startswith("who sends proposal ")
     south = honest.messages["sender"].eq("south")
     for name, rows in (("sent_s", south), ("read_s", honest.messages["receiver"].eq("south"))):
         forged = column("messages", name, lambda f: 11.0, lambda f, rows=rows: rows)(honest)
