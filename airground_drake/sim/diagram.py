@@ -5,7 +5,7 @@ Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (pre
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -23,7 +23,8 @@ from airground_drake.model.law.avoidance import COMPOSITIONS, Composition
 from airground_drake.model.law.task import Task
 from airground_drake.scenario.links import make_links
 from airground_drake.scenario.load import validated
-from airground_drake.scenario.schema import Faults, Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.sensing import errors_of
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import (
@@ -44,7 +45,7 @@ from airground_drake.sim.blocks import (
 from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvController
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
 from airground_drake.sim.blocks.positions import positions_between
-from airground_drake.sim.blocks.sensing import Errors, PositionSensing
+from airground_drake.sim.blocks.sensing import PositionSensing
 from airground_drake.sim.blocks.signals import inputs_of, outputs_of
 
 # Exported output ports of the diagram: the signals of a trace.
@@ -183,9 +184,8 @@ def build_model(
         start, sent = next(iter(plans.values())).start(), _named("sent", plans).values()
         links = Downlink(down, sent, start, period, retry, components.lost_at(scenario)), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}
-    if scenario.sensing:
-        error_m = scenario.position_error_m + (scenario.faults or Faults()).position_error_m
-        parts["sensing"] = PositionSensing(Errors(replace(scenario.sensing, position_error_m=error_m), world), world)
+    if errors := errors_of(scenario, world):
+        parts["sensing"] = PositionSensing(errors, world)
     parts |= between.parts
     if monitor is not None:
         parts["monitor"] = monitor

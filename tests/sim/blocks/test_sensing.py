@@ -19,8 +19,8 @@ from airground_drake.model.plants.budget import Bounds, costs, kept_distance, la
 from airground_drake.scenario.budget import budget
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import ERRORS, Scenario
+from airground_drake.scenario.sensing import Errors
 from airground_drake.scenario.world import make_world
-from airground_drake.sim.blocks.sensing import Errors
 from airground_drake.sim.diagram import make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
