@@ -1,7 +1,8 @@
 """Robots beside obstacles that may move, period by period: what each kept, lost, and did.
 
 A robot keeps n.v >= -(D - d - V h) / h, and n.v >= 0 where D < d + V h: it is *passive* there. Whatever it then loses
-of min(D, d + V h), the obstacle has moved itself.
+of min(D, d + V h), the obstacle has moved itself. Where a measured distance D' may be off by e, and D' - e >= d + V h,
+the first inequality with D' - e will do as well (theorem Passive.own_doing, `advances`).
 """
 
 from fractions import Fraction
@@ -13,7 +14,7 @@ from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import away_from
-from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, shortfalls
+from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortfalls
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, Pair, cores_of, is_planar, origin_of, pairs_of
 
 STANDING_M_S = 1e-9  # a robot that is commanded no more than this stands, m/s
@@ -95,8 +96,15 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
         for part in range(len(cores.base)):
             core = POINT if cores.are_points else cores.take(part)
             place = origin + cores.points[part] if cores.are_points else origin
-            asked = Fraction(1), Fraction(0), last
-            missed = np.maximum(missed, shortfalls(first, place, keeps, *asked, core, planar=planar, held=True))
+            asked, how = (Fraction(1), Fraction(0), last), {"planar": planar, "held": True}
+            of_part = shortfalls(first, place, keeps, *asked, core, **how)
+            if pair.error_m and of_part.any():
+                seen, there = trace.as_seen(pair.first, pair.first)[which], np.broadcast_to(place, first.shape)[:-1]
+                sure = rounded_up(Fraction(keeps) + Fraction(pair.error_m))
+                as_seen = shortfalls(first, place, sure, *asked, core, seen=(seen, there), **how)
+                far = away_from(core, seen - there, planar=planar).distance >= sure
+                of_part = np.where(far, np.minimum(of_part, as_seen), of_part)
+            missed = np.maximum(missed, of_part)
     missed = np.maximum(missed - pair.slip_m, 0.0)  # for which the law keeps more
     moved = np.linalg.norm(np.diff(origin, axis=0), axis=1)
     lasting = np.diff(trace.t[around])
