@@ -333,8 +333,8 @@ class Sensing:
 
     The law keeps as much more as that costs (`airground budget`), and robots stand where measured inequalities
     contradict one another. 'drawn' errors change smoothly. 'adversarial' ones are at the bound: the nearest thing looks
-    farther ('away') or is seen in another direction ('sideways'), by turns of half a second. Beside obstacles that may
-    move nothing is promised then, and a scenario with both is refused.
+    farther ('away') or is seen in another direction ('sideways'), by turns of half a second. Where obstacles are is
+    known; beside one that may move a robot only goes where it surely gets no nearer, or stands.
     """
 
     position_error_m: NotNegative = 0.0
