@@ -6,6 +6,7 @@ the first inequality with D' - e will do as well (theorem Passive.own_doing, `ad
 """
 
 from fractions import Fraction
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,12 +97,15 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
         for part in range(len(cores.base)):
             core = POINT if cores.are_points else cores.take(part)
             place = origin + cores.points[part] if cores.are_points else origin
-            asked, how = (Fraction(1), Fraction(0), last), {"planar": planar, "held": True}
-            of_part = shortfalls(first, place, keeps, *asked, core, **how)
+            missing = partial(
+                shortfalls, first, place, share=Fraction(1), gain=Fraction(0), last=last, core=core, planar=planar,
+                held=True,
+            )  # fmt: skip
+            of_part = missing(d=keeps)
             if pair.error_m and of_part.any():
                 seen, there = trace.as_seen(pair.first, pair.first)[which], np.broadcast_to(place, first.shape)[:-1]
                 sure = rounded_up(Fraction(keeps) + Fraction(pair.error_m))
-                as_seen = shortfalls(first, place, sure, *asked, core, seen=(seen, there), **how)
+                as_seen = missing(d=sure, seen=(seen, there))
                 far = away_from(core, seen - there, planar=planar).distance >= sure
                 of_part = np.where(far, np.minimum(of_part, as_seen), of_part)
             missed = np.maximum(missed, of_part)
