@@ -53,13 +53,13 @@ NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (
 class GatePlan(GateClaim):
     id = "GATE-PLAN"
     subject = "plans of the gatekeeper"
-    summary = "Every decision rests on a plan that is feasible and costs what was recorded."
+    summary = "Every decision is based on a feasible plan whose cost was recorded correctly."
     statement = (
         "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
-        "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of "
-        "at most half a stage. Under method (d) a decision accepts or refuses for good: it never chose to stop short "
-        "of the goal if the other choice would reach it, or stop nearer to it. The margin decides nothing: it is the "
-        "largest known gap between the cost of a plan and the optimum of the half-plane problem."
+        "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of at"
+        " most half a stage. Under method (d) no decision chose to stop short of the goal if the other choice would "
+        "have reached it, or stopped nearer to it. The margin is informative only: it is the largest known gap between"
+        " the cost of a plan and the optimum of the half-plane problem."
     )
     latex = (
         r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "
@@ -76,33 +76,32 @@ class GatePlan(GateClaim):
     method = (
         "All numbers are computed again in numpy from the recorded problem. No step of a constant plan is longer than "
         "the speed limit allows, unless it begins more than 1e-6 m inside a safe distance, where avoidance may demand "
-        "more. A stage of another plan is held to that only if the constant plan of its mode keeps clear there. "
-        "Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; after a deficit "
-        "within 1e-9 of 1/2 either mode may follow. For the gap, the half-plane problems of all decisions are stacked "
-        "into one convex program and solved by cvxpy and Clarabel. The solver is not trusted: its multipliers give the "
-        "lower bound L by weak duality, evaluated in numpy, whatever their quality; with up to 12 blocks of stages all "
-        "plans are evaluated instead. The gap is unknown if a plan has no half-planes (the route 'nonlinear' records "
-        "none) or if the bounds of an optimum are more than 1e-5 apart. Problems of at most 10 choices are also solved "
-        "by evaluating all plans with the exact distances of (26d)."
+        "more. For other plans, this limit applies to a stage only if the constant plan of its mode keeps clear there."
+        " Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; after a "
+        "deficit within 1e-9 of 1/2 either mode may follow. For the gap, the half-plane problems of all decisions are "
+        "stacked into one convex program and solved by cvxpy and Clarabel. The solver need not be trusted: any "
+        "multipliers give a valid lower bound L by weak duality, which is evaluated in numpy. With up to 12 blocks of "
+        "stages all plans are evaluated instead. The gap is unknown if a plan has no half-planes (the route "
+        "'nonlinear' records none) or if the bounds of an optimum are more than 1e-5 apart. Problems of at most 10 "
+        "choices are also solved by evaluating all plans with the exact distances of (26d)."
     )
     equations = "(22)-(29)"
     assumptions = (
         "The problem of each decision is the recorded one: mode velocities, reference, other bodies, weights and unit "
-        "normals. A half-plane is part of it only where some plan can come nearer than d: elsewhere (26d) asks for "
-        "nothing.",
-        "The cost of the choice that lost is the recorded one.",
+        "normals. It contains a half-plane only where some plan can come closer than d; elsewhere (26d) has no effect.",
+        "The cost of the rejected choice is the recorded one.",
         "The recorded relaxed plan was rounded, and no other.",
         "Under method (d), the recorded outcomes of both choices.",
     )
     does_not_establish = (
         "That the prediction is right, or that the run went as predicted. (26d) is soft: a feasible plan may lead "
-        "inside a safe distance, at the cost of its slack (SAFE-TRACE is about safety). A wide gap refutes nothing: "
-        "half-planes are conservative, and the best plan by exact distances may cost less than their optimum. The "
-        "gatekeeper takes the cheapest plan it knows, which need not be the rounded one. Refusals without a plan "
-        "are only listed."
+        "inside a safe distance, at the cost of its slack (SAFE-TRACE is about safety). A large gap does not refute "
+        "the claim: half-planes are conservative, and the best plan by exact distances may cost less than their "
+        "optimum. The gatekeeper takes the cheapest plan that it knows, which need not be the rounded one. Refusals "
+        "without a plan are only listed."
     )
 
-    exercised_by = "decisions that rest on a plan or on predicted outcomes"
+    exercised_by = "decisions based on a plan or on predicted outcomes"
 
     def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Judge every plan; the margin is the largest gap."""

@@ -23,10 +23,10 @@ AT_REST_M = 1e-3
 class LiveGoal(TraceClaim):
     id = "LIVE-GOAL"
     subject = "arrival"
-    summary = "Every robot ended where it must: at its target, or where the scenario says that it stalls."
+    summary = "Every robot ended at its target, or at the point where the scenario expects it to stall."
     statement = (
-        "Every robot ended the run at its target, or standing where the scenario declares that it stalls. For a robot "
-        "that collided, its motion before the first collision counts."
+        "Every robot ended the run at its target, or standing at the point where the scenario expects it to stall. For"
+        " a robot that collided, only its motion before the first collision counts."
     )
     latex = (
         r"\lVert p_i(T) - \text{target}_i \rVert \le \varepsilon_{\text{arrival}}",
@@ -41,11 +41,11 @@ class LiveGoal(TraceClaim):
     equations = "(6), (9)-(10)"
     assumptions = ("The scenario's duration is long enough to judge: the run is not continued.",)
     does_not_establish = (
-        "Arrival from other starts, without bound on time, or that a stalled UGV would stay for ever; nor that robots "
-        "tracked their preset on the way. Without potential or navigation function no convergence proof exists."
+        "Arrival from other starts or in unlimited time, that a stalled UGV would stay for ever, or that robots "
+        "tracked their preset. Without a potential or navigation function there is no convergence proof."
     )
 
-    exercised_by = "robots that had a way to go to where they must end"
+    exercised_by = "robots that did not start where they must end"
 
     def check(self, trace: Trace) -> Finding:
         stalls = trace.scenario.runs[trace.run].stalls_m

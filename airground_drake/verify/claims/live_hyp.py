@@ -14,11 +14,13 @@ from airground_drake.verify.runs.proposals import METHOD, Acceptance, acceptance
 
 class LiveHyp(GateClaim):
     id = "LIVE-HYP"
-    summary = "No UGV followed the UAV more often or longer than it may, or changed its mind without a new obstacle."
+    summary = (
+        "No UGV followed the UAV more often or longer than allowed, or reversed an acceptance without a new obstacle."
+    )
     statement = (
-        "Between two rests, no UGV accepted more proposals than it may, and none executed proposals for longer than "
-        "LIVE-WAIT allows. Every acceptance ended in time. No UGV gave a proposal back early, unless it first sensed "
-        "an obstacle that was not on the proposal's map."
+        "Between two rests, no UGV accepted more proposals than allowed, and none executed proposals for longer than "
+        "LIVE-WAIT allows. Every acceptance ended in time. No UGV ended an accepted proposal early, unless it first "
+        "sensed an obstacle that was not on the proposal's map."
     )
     formula = (
         "between two rests of rest_s on its own: acceptances <= tries, time executed <= tries (longest_s + h); "
@@ -30,13 +32,13 @@ class LiveHyp(GateClaim):
         r"t_{\text{end}} \le \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}}) + h",
     )
     method = (
-        "Intervals of acceptance follow from the decisions of each UGV. What it executed is recorded at each control "
-        "sample. Which obstacles were new to it is recorded with its decisions."
+        "Intervals of acceptance are computed from the decisions of each UGV. The trace records the executed proposal "
+        "at each control sample, and new obstacles with each decision."
     )
     equations = "(20)"
     assumptions = ("A proposal without a decision at a sample of the gatekeeper is no longer in force.",)
     does_not_establish = (
-        "That accepted proposals were useful, or that UGVs arrive (LIVE-GOAL). Why proposals were accepted or refused."
+        "That accepted proposals were useful, that UGVs arrive (LIVE-GOAL), or why proposals were accepted or refused."
     )
 
     exercised_by = "acceptances"

@@ -107,16 +107,16 @@ class SafeHyp(TraceClaim):
     subject = "conditions of the proof"
     summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."
     statement = (
-        "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
-        "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run, A / 2 for A where one of "
-        "two robots may have to stand. Beside an obstacle that may move the passive law held, and it moved no faster "
-        "than declared: so d was kept in every period that began at d + V h or more. The controllers were built with "
-        "what the scenario says; one of the user's own is "
-        "judged by its steps alone. Where robots act on measured positions, the inequalities are those of the pair as "
-        "measured, errors were within their bound, and d is that of the true bodies. Where messages between UGVs may "
-        "be lost, a UGV stood unless it knew that those whose message it lacked were far. Where UGVs act on old "
-        "positions (`control.law: asynchronous`), each of their steps kept off all places where the other could be "
-        "until that one decided again, up to e, and two of them kept d less the sum of all e."
+        "At every control sample of the run the hypotheses of the safety theorem held, up to an error e for each pair "
+        "of bodies. So each pair of robots and static bodies kept d - e / (A h) at all times of the run, with A / 2 "
+        "for A if one of two robots may have to stand. Beside an obstacle that may move, the passive law held and the "
+        "obstacle was no faster than declared, so d was kept in every period that began at d + V h or more. The "
+        "controllers had the scenario's parameters; a controller of the user's own is judged by its steps alone. If "
+        "robots act on measured positions, the inequalities are about measured positions, the errors were within their"
+        " bound, and d is about true bodies. If messages between UGVs may be lost, a UGV stood unless it knew that the"
+        " senders of missing messages were far. If UGVs act on old positions (`control.law: asynchronous`), each step "
+        "avoided all points that the other could reach before it decided again, up to e, and the two kept d minus the "
+        "sum of all e."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -134,36 +134,36 @@ class SafeHyp(TraceClaim):
     )
     method = (
         "Exact arithmetic on the recorded positions at the control samples and on the corners of obstacles, which are "
-        "rational numbers; square roots are enclosed. Pairs and samples are left out if floats find them far apart, or "
-        "an inequality met by more than 1e-9 m. D and d are distances of a robot's centre from another centre, or from "
-        "a convex core: a point, a wall, a polygon or a prism; n is the unit vector away from its nearest point, "
-        "inside a polygon the normal of its nearest edge. A barrier of several parts has an inequality for each of "
-        "them, and keeps what all of them keep. The distances promised are listed less the radii. The parameters of "
-        "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
-        "apart count as one instant. With errors of positions D and n are those of measured ones and steps are true: a "
-        "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands. "
-        "The same holds for two robots of which one may lack the other's message. Old positions are those that the "
-        "sender had at the recorded sample at which it sent the last message that arrived."
+        "rational numbers; square roots are enclosed. Pairs and samples are skipped if floating-point numbers show "
+        "that they are far apart, or that an inequality is met by more than 1e-9 m. D and d are distances of a robot's"
+        " centre from another centre, or from a convex core: a point, a wall, a polygon or a prism; n is the unit "
+        "vector away from its nearest point, inside a polygon the normal of its nearest edge. A barrier of several "
+        "parts has an inequality for each part, and the promised distance is the least over the parts. The radii are "
+        "subtracted from the listed distances. The parameters of the controllers were read back from the diagram and "
+        "are compared with the scenario. Rows less than 1e-9 s apart count as one instant. With position errors, D and"
+        " n are measured and steps are true: a pair meets the sum of its inequalities, with half the gain between two "
+        "robots, or is far apart, or stands. The same holds for two robots if one may miss the other's message. An old"
+        " position is the sender's position at the recorded sample of the last message that arrived."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention).",
-        "The points that the law steers move straight from row to row. Of robots that turn, lag or get their commands "
-        "late, D and d are those of these points: d_law of SAFE-BUDGET.",
+        "The points that the law steers move straight from row to row. For robots that turn, lag or receive commands "
+        "late, D and d are about these points: d is d_law of SAFE-BUDGET.",
         "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
-        "time on, and the safe start is that D >= d at that sample. The bodies of robots that lag, get their commands "
-        "late or never drive backwards must be clear then, too, and so must their ways under commands already given, "
-        "for the time of the delay. If they are not, nothing is promised for the pair.",
+        "time on, and the safe start is that D >= d at that sample. At that sample, the bodies of robots that lag, "
+        "receive commands late or never drive backwards must also be clear, and so must their paths during the delay "
+        "under commands already given. Otherwise nothing is promised for the pair.",
         "All robots act on the same measured positions, those that are recorded.",
-        "With `control.law: asynchronous` UGVs are discs that move as they are told, and what one hears of another one "
-        "was true when it was sent.",
-        "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",
+        "With `control.law: asynchronous` UGVs are discs that follow commands exactly, and the positions that they "
+        "receive were exact when sent.",
+        "Beside an obstacle that may move no safe start is required, because the robot is passive near it.",
     )
     does_not_establish = (
-        "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). Broken hypotheses do not mean that the distance was "
+        "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). A broken hypothesis does not mean that the distance was "
         "violated, only that no more than d - e / (A h) is promised: inside several safe distances at once the "
-        "inequalities can contradict each other. Nothing is said about other runs, and of the periods in which a robot "
-        "was passive only that it did not bring itself nearer (SAFE-OWN)."
+        "inequalities can contradict each other. It says nothing about other runs. For periods in which a robot was "
+        "passive, only SAFE-OWN applies."
     )
 
     theorems = (

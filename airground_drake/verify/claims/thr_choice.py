@@ -30,7 +30,7 @@ Row = dict[str, float]
 class ThrChoice(ModelClaim):
     id = "THR-CHOICE"
     subject = "choice of the threshold"
-    summary = "The threshold in force is the best one for the scenario's own numbers, or it is declared by the user."
+    summary = "The threshold in force is optimal for the scenario's own numbers, or the user declared it."
     statement = (
         "The threshold in force minimises the Bayes risk for the scenario's own c1, c2, drift and noise, or the user "
         "declared it: the rule `fixed` takes a number, the rule `printed` takes (19) as the paper prints it."
@@ -39,16 +39,17 @@ class ThrChoice(ModelClaim):
         r"\text{rule bayes: } B(\zeta) = \min_z B(z), \quad \text{otherwise } B(\zeta) - \min_z B(z) \text{ is shown}",
     )
     method = (
-        "The optimum is the root of (19) with c2/c1, enclosed by two signs in ball arithmetic (THR-ROOT, THR-OPT). The "
-        "threshold in force equals it to 1e-6 (relative), or it is declared. A declared threshold cannot be refuted, "
-        "so it counts as not exercised. Each run then shows the drift that the task error had in the last second "
-        "before it first reached the threshold, the noise, the optimum for both, and what the threshold costs."
+        "The optimum is the root of (19) with c2/c1, enclosed by two signs in ball arithmetic (THR-ROOT, THR-OPT). The"
+        " threshold in force equals it to 1e-6 (relative), or it is declared. A declared threshold cannot be refuted, "
+        "so it counts as not exercised. For each run the report shows the drift of the task error in the last second "
+        "before it first reached the threshold, the noise, the optimum for both, and the cost of the threshold in "
+        "force."
     )
     equations = "(16)-(20), Table 1"
     assumptions = ("Drift and noise of the rule are those that the user assumes; (16)-(18) without initial deviation.",)
     does_not_establish = (
-        "That the assumed drift and noise are those of the runs: compare the rows of the runs. A declared threshold "
-        "need not be optimal. The risk says nothing about what an intervention brings."
+        "That the assumed drift and noise agree with the runs: compare the rows of the runs. A declared threshold need"
+        " not be optimal. The risk does not measure the benefit of an intervention."
     )
     expected: Status = "holds"
     exercised_by = "thresholds that are, or must be, the optimum"
