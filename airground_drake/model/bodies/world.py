@@ -259,7 +259,7 @@ class World:
         )  # fmt: skip
 
     def _share(self, robot: Body, other: Body) -> float:
-        """The part of an inequality that a robot takes beside a body that moves; below 0 as in `Neighbours`."""
+        """The share of the inequality that a robot takes beside a moving body; negative as in `Neighbours`."""
         if other.kind not in ROBOTS:
             return 1.0
         unsure_m = self.unsure_s * other.max_speed_m_s if robot.kind == other.kind == "ugv" else 0.0

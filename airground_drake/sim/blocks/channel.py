@@ -31,7 +31,7 @@ class Down(Immutable):
 
 
 class Downlink(LeafSystem):
-    """The link from UAVs to their UGVs. A UAV that is not lost repeats a message until an answer shows that it was read.
+    """The link from UAVs to their UGVs, with repetition of messages until an answer shows that they were read.
 
     Ports: in `sent`, the planner's memory, with several UAVs one of each, `sent_<uav>`; `heard`, see `Uplink`, used by
     updates only; out `inbox`, all deliveries so far, in the order of arrival.
