@@ -1,4 +1,4 @@
-"""GATE-PLAN: every plan of a run is feasible at the cost that was recorded, and how far it is from the optimum.
+"""GATE-PLAN: every plan of a run is feasible and has its recorded cost; also its gap to the optimum.
 
 A decision's problem is convex once its plan is relaxed and its distances are measured along recorded unit normals,
 and convexity gives bounds that need no trust in any solver: see `enclose`.
@@ -152,7 +152,7 @@ class GatePlan(GateClaim):
 
 
 def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
-    """(26b)-(26e), (25) and what was recorded about the plan."""
+    """Compare (26b)-(26e), (25) and the recorded numbers of the plan."""
     limit = trace.scenario.ugvs[row.robot].max_speed_m_s
     period = trace.scenario.control.period_s
     begins = row["initial_m"] - _seen_at(trace, row)
@@ -195,7 +195,7 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
 
 
 def _seen_at(trace: Trace, row: DecisionRecord) -> Array:
-    """Where a UGV saw itself when it decided, (3,), m."""
+    """A UGV's measured position when it decided, (3,), m."""
     if trace.scenario.sensing is None:
         return interpolate(trace.t, trace.position(row.robot), row.t_s)
     sample = int(np.searchsorted(trace.sampled("t_s"), row.t_s - TIME_TOLERANCE_S))
@@ -241,7 +241,7 @@ def _of_decisions(
 
 
 def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
-    """A choice that stops short of the goal, beside the other one; and what such a stop costs."""
+    """Compare a choice that stops short of the goal with the other one."""
     given, speed = row.given, trace.scenario.ugvs[row.robot].preset.speed_m_s
     chosen, other = ("accept", "refuse") if given["decision"] == "accept" else ("refuse", "accept")
     worse = given[f"{chosen}_stalls"] - given[f"{other}_stalls"]
@@ -257,7 +257,7 @@ def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
 
 
 def _above_the_other(row: DecisionRecord) -> float:
-    """How much the choice costs more than the better one, relative to that; 0 if only the other one stops short."""
+    """Relative excess cost of the choice over the better one; 0 if only the other one stops short."""
     cost = {choice: row.given[f"{choice}_outcome_m2_s"] for choice in ("accept", "refuse")}
     if row.given["accept_stalls"] != row.given["refuse_stalls"]:
         return 0.0
@@ -303,7 +303,7 @@ def cheapest_of_blocks(row: DecisionRecord, blocks: int) -> Enclosure:
 
 
 def above_the_best(row: DecisionRecord, blocks: int) -> float:
-    """How much the plan costs more than the best of all plans, by exact distances, relative to the best."""
+    """Relative excess cost of the plan over the best of all plans, by exact distances."""
     best = float(row.cost(row.positions(plans_of_blocks(row.stages, blocks or row.stages))).min())
     return (float(row.cost(row["positions_m"])) - best) / max(best, LEAST_COST)
 

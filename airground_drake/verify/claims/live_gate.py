@@ -44,7 +44,7 @@ class LiveGate(LiveWait):
         return {"over_after_s": float(inputs["longest_s"] + inputs["period_s"])}
 
     def seen_in(self, trace: Trace) -> tuple[int, int]:
-        """The acceptances during which no obstacle was new and none in range may move, and all."""
+        """The number of acceptances without a new obstacle or one in range that may move, and of all."""
         accepted = [acceptance for of_ugv in acceptances(trace).values() for acceptance in of_ugv]
         met = [acceptance for acceptance in accepted if not (acceptance.news_s or _beside_a_mover(trace, acceptance))]
         return len(met), len(accepted)

@@ -76,14 +76,14 @@ class LiveGoal(TraceClaim):
 
 
 class Condition(NamedTuple):
-    """A condition on a robot's end, as evidence, and whether the robot did not begin where it has to end."""
+    """A condition on a robot's end, as evidence, and whether the robot began elsewhere."""
 
     entry: dict[str, Any]
     had_a_way: bool = False
 
 
 class Way(NamedTuple):
-    """Where a robot was, up to its first collision."""
+    """A robot's motion up to its first collision."""
 
     t: Array  # (T,), s
     position: Array  # (T, 3), m
@@ -92,7 +92,7 @@ class Way(NamedTuple):
 def conditions(
     scenario: Scenario, stalls: Mapping[str, Sequence[float]], ways: Mapping[str, Way], last: Array
 ) -> Iterator[Condition]:
-    """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
+    """The scenario's conditions on each robot's end, with margins, m; `stalls` has the stall points of UGVs, m."""
     # last: where the n UGVs are at the end of the run, (n, 3), m
     arrival = float(scenario.arrival_tolerance_m)
     for ugv, given in scenario.ugvs.items():
@@ -117,7 +117,7 @@ def conditions(
 def _within(
     ways: Mapping[str, Way], robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float
 ) -> Condition:
-    """That a robot ends no farther from a point, (3,), m, than a tolerance."""
+    """The condition that a robot ends within a tolerance of a point, (3,), m."""
     there = np.asarray(point, dtype=np.float64)
     begin, end = ways[robot].position[[0, -1]]
     before, after = (float(np.linalg.norm(place - there)) for place in (begin, end))

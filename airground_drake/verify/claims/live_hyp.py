@@ -48,7 +48,7 @@ class LiveHyp(GateClaim):
         return trace.meta.get("method") == METHOD
 
     def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
-        """Go through all acceptances; the margin is what is left of the time that LIVE-WAIT allows."""
+        """Judge all acceptances; the margin is the rest of the time that LIVE-WAIT allows."""
         gate, accepted = trace.scenario.gatekeeper, acceptances(trace)
         allowed_s = gate.tries * (gate.longest_s + gate.period_s)
         most = 0
@@ -90,7 +90,7 @@ class LiveHyp(GateClaim):
 
 
 def _wrong(trace: Trace, of_ugv: list[Acceptance]) -> Iterator[dict[str, Any]]:
-    """Acceptances that were over too late, or given back too early without news."""
+    """Acceptances that ended too late, or too early without a new obstacle."""
     period_s = trace.scenario.gatekeeper.period_s
     for acceptance in of_ugv:
         sent, end_s, until_s = acceptance.on, acceptance.end_s, acceptance.until_s
@@ -103,7 +103,7 @@ def _wrong(trace: Trace, of_ugv: list[Acceptance]) -> Iterator[dict[str, Any]]:
 
 
 def _after_rests(of_ugv: list[Acceptance], rest_s: float) -> list[float]:
-    """When tries begin to count anew, s: at the start of the run, and at each acceptance after a rest."""
+    """Times at which tries are reset, s: the start of the run, and each acceptance after a rest."""
     begins = [acceptance.t_s for acceptance in of_ugv]
     ends = [0.0, *(acceptance.end_s for acceptance in of_ugv)]
     rested = (t_s for t_s, end_s in zip(begins, ends, strict=False) if t_s - end_s >= rest_s - TIME_TOLERANCE_S)
@@ -111,7 +111,7 @@ def _after_rests(of_ugv: list[Acceptance], rest_s: float) -> list[float]:
 
 
 def _executed_s(trace: Trace, ugv: str, begins: list[float]) -> list[float]:
-    """For how long a UGV executed proposals between such instants, s."""
+    """Time for which a UGV executed proposals between resets, s."""
     followed = np.append(trace.sampled(f"{ugv}.executing") >= 0, False).astype(np.int64)
     cuts = np.searchsorted(trace.sampled("t_s"), np.array(begins) - TIME_TOLERANCE_S)
     return [float(count) * trace.scenario.control.period_s for count in np.add.reduceat(followed, cuts)]

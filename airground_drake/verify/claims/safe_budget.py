@@ -1,4 +1,4 @@
-"""SAFE-BUDGET: bodies that are not where the law steers them keep their distances if the steered points keep theirs."""
+"""SAFE-BUDGET: bodies off their steered points keep their distances if the steered points keep the law's."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -74,7 +74,7 @@ class SafeBudget(TheoremClaim):
     margin_of = "distance in the law less what the plants take"
 
     def applies(self, scenario: Scenario) -> bool:
-        """Only a scenario with robots that are not where the law steers or sees them, or that may lack a position."""
+        """Only for robots off their steered or measured points, or that may miss positions."""
         lacking = any(scenario.seen(ugv)["may_stand"] for ugv in scenario.ugvs)
         return takes_room(scenario) or lacking or (scenario.asynchronous and len(scenario.ugvs) > 1)
 
@@ -100,7 +100,7 @@ class SafeBudget(TheoremClaim):
         }  # fmt: skip
 
     def _old(self, scenario: Scenario) -> list[dict[str, Any]]:
-        """Of each kind of two UGVs: what is promised, and how far off the other one can be at least, m."""
+        """For each kind of UGV pairs: promised distance, and least uncertainty of the other position, m."""
         groups = (group[0] for group in alike(budget(scenario)) if group[0].kind == "ugv")
         return [
             {
@@ -110,7 +110,7 @@ class SafeBudget(TheoremClaim):
         ]  # fmt: skip
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Check the hypotheses; the theorems are those about the plants that the scenario has."""
+        """Check the hypotheses of the theorems about the scenario's plants."""
         moving = any(pair["kind"] == "moving" for pair in inputs["pairs"])
         plants = [plant for plant, _ in _plants(inputs).values()]
         named = [*BASIC, *(name for plant in plants for name in plant.theorems)]

@@ -110,7 +110,7 @@ class SafeDist(TheoremClaim):
         return {"least_distances_m": least}
 
     def seen_in(self, trace: Trace) -> tuple[int, int, int]:
-        """Periods too near to an obstacle that may move, and those of them with a retreat at w, and at w + V."""
+        """Numbers of periods too near to an obstacle that may move, with a retreat at w, and with one at w + V."""
         w = self.inputs(trace.scenario)["disturbance_m_s"]
         passive = once = kept = 0
         for periods in beside(trace):
@@ -130,7 +130,7 @@ class SafeDist(TheoremClaim):
 
 
 def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:
-    """d - W/A, m; with A/2 between UGVs of which one may stand for lack of a message."""
+    """d - W/A, m; with A/2 between UGVs if one may stand because it misses a message."""
     disturbed = 1 if pair.kind == "obstacle" else 2
     halved = 2 if pair.kind == "ugv_ugv" and inputs.get("ugvs_may_stand") else 1
     return pair.safe_m - disturbed * halved * decimal(inputs["disturbance_m_s"]) / decimal(inputs["avoidance_gain_1_s"])

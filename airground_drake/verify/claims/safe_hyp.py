@@ -77,14 +77,14 @@ class _Hypothesis:
         return np.flatnonzero(~(self.margin >= -self.slop))
 
     def at(self, k: int) -> dict[str, Any]:
-        """What is needed to redo the evaluation at instant k by hand."""
+        """The numbers to repeat the evaluation at instant k by hand."""
         other = {"second": self.others[k]} if self.others else {}
         described = {"hypothesis": self.name, **self.about, **other, "t_s": float(self.t[k])}
         return {**described, "margin": float(self.margin[k]), "unit": self.unit}
 
 
 class Guarantee(NamedTuple):
-    """The distance that is promised for a pair of bodies: their gap is `gap_m` or more at all times of the run."""
+    """The promised distance of a pair of bodies: their gap is at least `gap_m` at all times of the run."""
 
     pair: Pair  # the two bodies
     # How far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
@@ -98,7 +98,7 @@ class Guarantee(NamedTuple):
 
     @property
     def margin_m(self) -> float:
-        """The distance promised less the safe one; not positive."""
+        """The promised minus the safe distance; at most 0."""
         return self.gap_m - self.pair.required_m
 
 
@@ -218,7 +218,7 @@ class SafeHyp(TraceClaim):
 
 
 def _against(trace: Trace, first: dict[str, Any], broken: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The hypothesis broken first, with what is needed to redo it by hand."""
+    """The hypothesis broken first, with the numbers to repeat the evaluation by hand."""
     against = first | snapshot(trace, map(str, first.values()), first["t_s"])
     if first["hypothesis"] != DECLARED:
         return against
@@ -242,7 +242,7 @@ def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
 def _shown(
     first: dict[str, Any] | None, worst: Sequence[dict[str, Any]], listed: Sequence[Any], kept: Sequence[Guarantee]
 ) -> dict[str, Any]:
-    """The entry with the finding's margin: that of the hypothesis broken first, or else of the inequalities."""
+    """The entry with the finding's margin: the hypothesis broken first, otherwise the inequalities."""
     if first and first["hypothesis"] == BUILT:
         return first
     name = first["hypothesis"] if first else AVOIDANCE
@@ -255,7 +255,7 @@ def _shown(
 
 
 def _listed(trace: Trace, promised: Guarantee) -> dict[str, Any]:
-    """A row of the evidence, with the sample at which the most was missed, if anything was."""
+    """A row of the evidence, with the sample of the largest violation, if any."""
     e, k = float(promised.missed_m.max()), int(np.argmax(promised.missed_m))
     pair, why = promised.pair, {"why": promised.why} if promised.why else {}
     described = {"first": pair.first, "second": pair.second, "safe_distance_m": pair.required_m}
@@ -268,13 +268,13 @@ def _finite(metres: float) -> float | None:
 
 
 def _gain(trace: Trace) -> Fraction:
-    """a = min(A h, 1), of the numbers as they are written."""
+    """a = min(A h, 1), of the exact decimals."""
     control = trace.scenario.control
     return min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
 
 
 def guarantees(trace: Trace) -> list[Guarantee]:
-    """The distance that is promised for each pair that comes near."""
+    """The promised distance of each pair that comes near."""
     # Other pairs stay so far apart that the longest steps of both could not break their distance.
     return trace.derived("guarantees", lambda: list(_guarantees(trace)))
 
@@ -327,7 +327,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
 
 
 def _unsure_m(trace: Trace, pair: Pair) -> float:
-    """The largest way that one of two UGVs had to reckon with of the other one, m; inf if it had no position of it."""
+    """The largest uncertainty of one UGV's position for the other, m; inf without a received position."""
     both_ways = [*permutations((pair.first, pair.second))]
     if any((heard_at(trace, *names) < 0).any() for names in both_ways):
         return inf
@@ -335,7 +335,7 @@ def _unsure_m(trace: Trace, pair: Pair) -> float:
 
 
 def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
-    """What two UGVs keep that act on old positions of each other: theorem Async.old_positions."""
+    """The distance that two UGVs keep under the asynchronous law: theorem Async.old_positions."""
     missed = missed_m(trace, pair.first, pair.second, pair.law_m) + missed_m(trace, pair.second, pair.first, pair.law_m)
     places = [trace.position(name)[0] for name in (pair.first, pair.second)]
     short = shortage(places[0], places[1], pair.law_m)
@@ -346,7 +346,7 @@ def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
 
 
 def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> tuple[Array, Array]:
-    """Places of a pair that robots act on at the samples, (K, 3), m, each."""
+    """Measured positions of a pair at the samples, (K, 3), m, each."""
     samples = slice(there.start, there.stop - 1)
     own = trace.as_seen(pair.first, pair.first)[samples]
     other = trace.as_seen(pair.first, pair.second)[samples] if pair.second in trace.robots else None
@@ -354,7 +354,7 @@ def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> tuple[Array, 
 
 
 def _bears_errors(pair: Pair, gain: Fraction, lost: Fraction) -> bool:
-    """Whether err (1 - A h) <= A h kept, where the points keep d_law - err less what is lost, drifts included."""
+    """Whether err (1 - A h) <= A h kept, where kept is d_law - err minus losses and drifts."""
     error = Fraction(pair.error_m)
     kept = Fraction(pair.law_m) - error - Fraction(pair.drift_m) - lost
     return error < kept and error * (1 - gain) <= gain * kept
@@ -363,7 +363,7 @@ def _bears_errors(pair: Pair, gain: Fraction, lost: Fraction) -> bool:
 def _beside(
     trace: Trace, pair: Pair, places: dict[str, Array], there: slice, reach: float
 ) -> list[tuple[Array, Cores]]:
-    """What the first body of a pair keeps away from: places of the second and its core, or each part of a barrier."""
+    """The obstacles of the first body of a pair: positions and core of the second, or of each part of a barrier."""
     # Parts that stay beyond reach of the way of the first are left out. A point is given by its place.
     if pair.second in places:
         return [(places[pair.second][there], POINT)]
@@ -383,7 +383,7 @@ def _longest(places: Array, last: float) -> float:
 
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
-    """The distance that is lost, m, because a sample misses the inequalities."""
+    """The lost distance, m, because a sample violates the inequalities."""
     t, bounds = trace.sampled("t_s"), bounds_of(trace)
     for promised in kept:
         pair, missed_m = promised.pair, promised.missed_m
@@ -395,7 +395,7 @@ def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]
 
 
 def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
-    """Beside obstacles that may move: the passive law, and that they move no faster than declared."""
+    """Beside obstacles that may move: the passive law, and their declared speeds."""
     period_s, ends = trace.scenario.control.period_s, period_ends(trace)
     for periods in beside(trace):
         about = {"first": periods.pair.first, "second": periods.pair.second}
@@ -409,7 +409,7 @@ def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
 
 
 def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
-    """How many avoidance inequalities were in range of a robot, and how many bound a command, by who avoided whom."""
+    """Numbers of avoidance inequalities in range, and of those that limited a command, by pair."""
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
     count |= {"uav beside uav": 0} if len(trace.uavs) > 1 else {}
@@ -484,7 +484,7 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
 
 
 def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
-    """UGVs stand where they lack a message of another one that is not surely far."""
+    """UGVs stand if they miss a message of another one that is not certainly far."""
     if trace.scenario.asynchronous or trace.scenario.ugv_links is None or not trace.scenario.ugv_links.loss:
         return
     t, period, bounds = trace.sampled("t_s"), trace.scenario.control.period_s, bounds_of(trace)
@@ -503,7 +503,7 @@ def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
 
 
 def error_margins(trace: Trace, robot: str) -> Array:
-    """By how much the errors of a robot's measured positions are below their bound, (S,), m; exact in their signs."""
+    """Margins of a robot's position errors to their bound, (S,), m, with exact signs."""
     most = decimal(trace.scenario.position_error_m)
     seen, true = trace.as_seen(robot, robot).tolist(), trace.position(robot)[trace.sample_rows].tolist()
     margins = list[float]()
@@ -516,7 +516,7 @@ def error_margins(trace: Trace, robot: str) -> Array:
 
 
 def least_shares(trace: Trace) -> list[dict[str, Any]]:
-    """The least share s that was left of each command that is shortened, 1 in full, and the gain s A of recoveries."""
+    """The least factor s by which commands were shortened (1: not), and the recovery gain s A."""
     gain = trace.scenario.control.avoidance_gain_1_s
     names = [ugv for ugv in trace.ugvs if trace.plant(ugv).steering is not None]
     shares = {name: float(trace.sampled(f"{name}.command_share").min()) for name in names}
@@ -524,7 +524,7 @@ def least_shares(trace: Trace) -> list[dict[str, Any]]:
 
 
 def own_plants(trace: Trace) -> list[dict[str, Any]]:
-    """The largest drift and cover of each robot with a user's plant, and what is declared."""
+    """The largest and the declared drift and cover of each robot with a user's plant."""
     plants = []
     for name, robot in trace.scenario.robots.items():
         if measured := trace.plant(name).measured:
@@ -553,7 +553,7 @@ def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
 
 
 def _covers(trace: Trace, robot: str) -> Iterator[Premise]:
-    """A body is no farther from the point that the law steers than the law accounts for."""
+    """A body stays within its cover of the steered point."""
     if trace.is_apart(robot) and not trace.plant(robot).measured:
         away = np.linalg.norm(trace.body(robot) - trace.position(robot), axis=1)
         yield Premise("cover of the body", "m", trace.t, bounds_of(trace)[robot].rolling_m - away)

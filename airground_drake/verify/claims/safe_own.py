@@ -1,4 +1,4 @@
-"""SAFE-OWN: what the robots themselves did to the distances of a run in which obstacles may move."""
+"""SAFE-OWN: the robots' own effect on the distances of a run in which obstacles may move."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -55,7 +55,7 @@ class SafeOwn(TraceClaim):
     exercised_by = "control periods in which an obstacle that may move was within reach"
 
     def applies(self, trace: Trace) -> bool:
-        """Only a run with obstacles that may move; else SAFE-TRACE says the same."""
+        """Only for runs with obstacles that may move; otherwise SAFE-TRACE suffices."""
         try:
             return any(barrier.expected_speed_m_s > 0.0 for barrier in trace.scenario.barriers.values())
         except TraceError:

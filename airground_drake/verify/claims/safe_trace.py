@@ -102,7 +102,7 @@ class SafeTrace(TraceClaim):
 
 @dataclass(frozen=True)
 class Distance:
-    """Where a pair was closest, in row `row`: distances of surfaces, m, and the time, s."""
+    """The closest approach of a pair, in row `row`: distances of surfaces, m, and the time, s."""
 
     # It was exercised if one control period at full speed would have broken the safe distance, or that of the law.
 
@@ -118,12 +118,12 @@ class Distance:
 
 @per_trace
 def _entry(trace: Trace, k: int) -> Distance:
-    """Where the k-th pair was closest."""
+    """The closest approach of the k-th pair."""
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
     near = margin_m < pair.reach_m or (pair.more_m > 0.0 and steered_margin(trace, pair) < pair.reach_m)
     return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, near)
 
 
 def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:
-    """Where on the map, if it is about the map."""
+    """The place on the map, for pairs with the map."""
     return place_on_map(trace, worst.first, worst.t_s) if worst.second == MAP else {}

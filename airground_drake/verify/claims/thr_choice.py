@@ -1,4 +1,4 @@
-"""THR-CHOICE: whether the threshold in force is the right one for the scenario's own numbers, and for its runs."""
+"""THR-CHOICE: whether the threshold in force is optimal for the scenario's numbers, and for its runs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -89,7 +89,7 @@ class ThrChoice(ModelClaim):
         )
 
     def seen_in(self, trace: Trace) -> dict[str, Row]:
-        """What the drift and the noise of UGVs say whose task error grew to the threshold, by `run UGV`."""
+        """The optimal threshold for drift and noise of UGVs whose task error reached the threshold, by `run UGV`."""
         decision, zeta = trace.scenario.decision, float(trace.meta["zeta_m"])
         drifts = {ugv: drift_of(task_error(trace, ugv), zeta) for ugv in trace.ugvs}
         return {
@@ -126,7 +126,7 @@ def _chart(evidence: dict[str, Any], numbers: Sequence[float]) -> Chart:
 
 
 def measured(zeta: float, drift: float, noise: float, rule: Threshold) -> Row:
-    """What a drift, m/s, positive, and a noise, m/sqrt(s), say of a threshold, m, with the costs of a rule."""
+    """The evaluation of a threshold, m, for a positive drift, m/s, a noise, m/sqrt(s), and the costs of a rule."""
     optimum, extra = 0.0, rule.c1_1_s * zeta / drift  # without noise: decided after zeta / drift, never wrongly
     if noise > 0.0:
         numbers = drift, noise, rule.c1_1_s, rule.c2

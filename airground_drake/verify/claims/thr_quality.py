@@ -189,7 +189,7 @@ class Judge:
             yield Decided(self.robot, over, "missed", peak, peak - self.zeta, over - begun)
 
     def _trigger(self, time: float, begun: float | None, released: float) -> Decided:
-        """A trigger; `begun`: start of the excursion that it serves, None outside."""
+        """The decision of a trigger; `begun` is the start of its excursion, None outside of one."""
         error = float(self.e.at(time))
         if begun is not None:
             late = time - begun
@@ -224,7 +224,7 @@ def drift_of(e: NormSignal, zeta: float) -> float | None:
 
 
 def _ddm(decisions: Sequence[Decided], zeta: float, drift: float, noise: float) -> dict[str, float | None]:
-    """The decisions about a UGV beside (17)-(18), without initial deviation."""
+    """The decisions about a UGV compared with (17)-(18), without initial deviation."""
     alone = zeta / drift
     scale = alone * (drift / noise) ** 2 if noise > 0.0 else math.inf
     late = [decided.late_s for decided in decisions if decided.late_s is not None and decided.kind != "missed"]

@@ -130,7 +130,7 @@ class ThrTrig(TraceClaim):
 
 
 def isolation(noise_period_s: float, period_s: float, levels: TriggerLevels) -> dict[str, Any]:
-    """Whether the theorems of Isolation.v apply here, in words, and their hypotheses."""
+    """Whether the theorems of Isolation.v apply, in words, and their hypotheses."""
     steps = decimal(noise_period_s) / decimal(period_s)
     says = f"the noise period is a whole number of control periods: {float(steps):g}"
     hypotheses = [
@@ -165,7 +165,7 @@ def levels_by(decision: Decision, zeta: float) -> TriggerLevels:
 
 
 def _block(trace: Trace) -> str:
-    """The block that computes the decision variable in place of (15); '' for (15) itself."""
+    """The name of the block that computes the decision variable; '' for (15) itself."""
     return str(trace.meta.get("decision_block", ""))
 
 
@@ -232,7 +232,7 @@ def _compare(expected: list[Transition], recorded: list[Transition], x: NormSign
 
 
 def _variable(trace: Trace, ugv: str) -> tuple[NormSignal, dict[str, Any], Conflict | None]:
-    """The decision variable that the trigger had, how it compares with (15), and the first row at which it differs."""
+    """The trigger's decision variable, its comparison with (15), and the first row that differs."""
     recorded = recorded_variable(trace, ugv)
     if _block(trace):
         return recorded, {"status": "not_run", "reason": "another block computes the decision variable"}, None
