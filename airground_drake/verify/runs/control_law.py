@@ -1,6 +1,6 @@
-"""The avoidance inequalities (7)-(8), (11), written again in numpy for all samples of a run at once.
+"""The avoidance inequalities (7)-(8), (11), written independently in numpy for all samples of a run at once.
 
-Velocities in m/s, positions in m, world frame. Nothing of the running code is used.
+Velocities in m/s, positions in m, world frame. The controllers' code is not used.
 """
 
 from typing import NamedTuple
@@ -55,7 +55,7 @@ def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Arr
 def _towards_old(
     normal: Array, bound: Array, distance: Array, safe: Array, unsure: Array, period_s: float
 ) -> tuple[Indices, Array, Array]:
-    """The inequalities with those towards old positions in their form: which they come from, normals, bounds."""
+    """The inequalities, with those for old positions in their own form: origins, normals, bounds."""
     # Within d + rho of an old position the velocity stays in a cone, between two lines in the plane; without a way that
     # surely leads off nothing is allowed, which two inequalities say that contradict each other.
     excess, k = distance - safe - unsure, np.arange(len(bound))
@@ -73,7 +73,7 @@ def _towards_old(
 
 
 def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
-    """The inequalities of a robot at the control samples of its run, beside all that is within sensing range."""
+    """The inequalities of a robot at the control samples of its run, for all bodies within sensing range."""
     samples = trace.sample_rows
     parts = parts_of(trace)
     control = trace.scenario.control
