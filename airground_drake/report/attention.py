@@ -151,7 +151,7 @@ def in_words(claim: Claim) -> str:
     at = f", {known['t_s']:.3f} s" if "t_s" in known else ""
     if claim.status in PASSING:
         idle = claim.exercised == 0
-        return f"nothing put it to the test: no {claim.exercised_by}" if idle else f"{claim.status} all the same"
+        return f"not tested: no {claim.exercised_by}" if idle else f"{claim.status} all the same"
     if claim.status != "refuted":
         why = claim.evidence.get("reason") or claim.evidence.get("error")
         return why if isinstance(why, str) else "could not be decided"

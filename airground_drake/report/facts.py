@@ -18,7 +18,7 @@ UNJUDGED = Claim(id="", run="", status="not_run", as_expected=None, exercised=No
 
 
 class Breach(NamedTuple):
-    """A pair that collided or came too near: the pair, when and how near, and whose doing it was, '' if not known."""
+    """A pair that collided or came too near: its names, when and how near, and the cause, '' if not known."""
 
     first: str
     second: str
@@ -105,16 +105,16 @@ class RunFacts:
 
     @property
     def whose(self) -> str:
-        """Whose doing the breaches were, in words; '' if that is not known of all of them."""
+        """The cause of the breaches, in words; '' if it is not known for all of them."""
         doings = [breach.doing for breach in self.breaches]
         ours = [doing for doing in doings if doing in rules.OURS]
         if not doings or "" in doings:
             return ""
         if not ours:
-            return "" if self.claim(rules.OWN_DOING).status == "refuted" else "not the robots' doing"
+            return "" if self.claim(rules.OWN_DOING).status == "refuted" else "not caused by the robots"
         if len(ours) < len(doings):
-            return f"{len(ours)} of {len(doings)} the robots' doing"
-        return "the robots' doing" + (", by commands already under way" if {*ours} == {"under way"} else "")
+            return f"{len(ours)} of {len(doings)} caused by the robots"
+        return "caused by earlier commands of the robots" if {*ours} == {"under way"} else "caused by the robots"
 
     @property
     def contradicts_its_proof(self) -> bool:

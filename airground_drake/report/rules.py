@@ -52,7 +52,7 @@ SAFE = (
     Rule(lambda run: run.is_broken, "no", "too close", kept=False),
     Rule(lambda run: run.claim(DISTANCES).status not in PASSING, "open", "not known", kept=False),
     Rule(lambda run: run.claim(DISTANCES).exercised == 0, "none", "nothing came near: untested"),
-    Rule(lambda run: run.is_proved and run.movers, "yes", "distances kept, proved but for what moves"),
+    Rule(lambda run: run.is_proved and run.movers, "yes", "distances kept, proved except for moving obstacles"),
     Rule(lambda run: run.is_proved, "yes", "distances kept, proved"),
     Rule(lambda run: True, "yes", "distances kept, not proved"),
 )
