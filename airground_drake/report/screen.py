@@ -56,7 +56,7 @@ class Row:
 
     @property
     def rank(self) -> tuple[int, bool, int, int]:
-        """Sort key, best first: kept, not known, too close, collided; then by cause (robots last), seeds and arrivals."""
+        """Sort key, best first: kept, not known, too close, collided; then by cause, seeds and arrivals."""
         facts = self.facts
         order = 0 if self.kept else 3 if facts and facts.collided else 2 if facts and facts.is_broken else 1
         alien = facts is not None and facts.whose.startswith("not")
