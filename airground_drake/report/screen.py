@@ -252,7 +252,7 @@ def _zeno(report: Report) -> Iterator[Check]:
         if bad := [claim.run for claim in traces if claim.status == "refuted"]:
             says, mark = f"two triggers too close in {', '.join(bad)}", "no"
         if gaps:
-            says += f"; {min(gaps):.3g} s seen"
+            says += f"; least gap {min(gaps):.3g} s"
         elif _verdict(traces) == "yes":
             says += "; no robot triggered twice"
         yield Check("Zeno-free?", mark, f"{', '.join(names)}: {says}" if len(told) > 1 else says, "claims")
@@ -351,7 +351,7 @@ def declared(report: Report) -> Cell:
     refuted = sum(claim.status == "refuted" and claim.as_expected is True for claim in report.claims)
     told = [f"{overall.as_expected} of {counted(overall.checks, 'check')} are as the scenario declares"]
     if refuted:
-        told[0] += f" ({refuted} of them failures)"
+        told[0] += f" ({counted(refuted, 'failure')} among them)"
     wrong = [*overall.differs, *overall.undecided, *overall.missing]
     subjects = {claim.id: claim.subject for claim in report.claims}
     names = [f"{claim.run or 'model'}: {subjects.get(claim.id) or claim.id or 'run'} "

@@ -294,7 +294,7 @@ def test_triggers() -> None:
         judged("ZENO-TRACE", evidence={"smallest_gap": {"gap_s": 3.61}}),
     )
     assert checks("Zeno-free?") == [("yes", f"{proved}; no robot triggered twice")]
-    assert checks("Zeno-free?", gaps) == [("yes", f"{proved}; 3.61 s seen")]
+    assert checks("Zeno-free?", gaps) == [("yes", f"{proved}; least gap 3.61 s")]
     short = judged("ZENO-PROOF", inputs={"dwell_s": 0.01})
     assert checks("Zeno-free?", short)[0][0] == "partly"
     assert checks("Zeno-free?", judged("ZENO-TRACE", status="error")) == [("yes", proved)]
