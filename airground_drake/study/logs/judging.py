@@ -2,8 +2,11 @@
 
 Motion between two samples is assumed to be straight; gaps of a track are not judged. An interval is the time between
 two sampling instants of a pair. The law is written with steps instead of velocities, with each interval's own length h:
-n.(own step - other's step) >= A h (d - D) if D <= d, else >= d - D. If interval k violates it by e_k, the deficit below
-d obeys deficit <= (1 - A h) deficit + e_k, by the induction of the safety theorem.
+
+    n.(own step - other's step) >= A h (d - D) if D <= d, else >= d - D.
+
+If interval k violates it by e_k, the deficit below d obeys deficit <= (1 - A h) deficit + e_k, by the induction of the
+safety theorem.
 """
 
 import math
