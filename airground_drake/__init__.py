@@ -5,8 +5,8 @@
     scenario = load("case_a")
     findings = judge(simulate(scenario, "d"))
 
-`build_diagram(scenario)` gives the Drake Diagram; `write_report(scenario, folder)` and
-`python -m airground_drake.report case_a` do everything.
+`build_diagram(scenario)` gives the Drake Diagram; `write_report(scenario, folder)` and `python -m
+airground_drake.report case_a` simulate, judge and write the report.
 """
 
 import sys

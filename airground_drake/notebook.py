@@ -1,6 +1,6 @@
-"""What a notebook shows of scenarios, traces, verdicts and diagrams: IPython asks the functions here.
+"""Formatters of scenarios, traces, verdicts and diagrams for IPython notebooks.
 
-They stand above what they show, so that it knows nothing of pictures. `import airground_drake` in a notebook calls
+They are separate so that the classes shown need not know about pictures. `import airground_drake` in a notebook calls
 `register`.
 """
 
@@ -45,14 +45,14 @@ def trace_html(trace: Trace) -> str:
 
 
 def verdict_html(verdict: Verdict) -> str:
-    """The line of `repr`, what the claim says, and what it does not establish."""
+    """The line of `repr`, the claim's statement, and what it does not establish."""
     claim = verdict.claim
     says = (repr(verdict), claim.statement, f"Does not establish: {claim.does_not_establish}")
     return "".join(f"<p>{escape(line)}</p>" for line in says)
 
 
 def diagram_html(diagram: Diagram) -> str | None:
-    """The picture of a scenario's diagram; none of any other diagram of Drake."""
+    """The picture of a scenario's diagram; None for other Drake diagrams."""
     from airground_drake.sim import graphviz
 
     return _element(graphviz.svg(graphviz.dot(diagram))) if graphviz.has_layers(diagram) else None

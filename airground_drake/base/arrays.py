@@ -1,4 +1,4 @@
-"""The array type of all computations."""
+"""The array type."""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ ROUNDOFF = 2.0**-53  # unit roundoff u of binary64: every operation returns its 
 
 
 def read_only(values: npt.ArrayLike) -> Array:
-    """A copy of the values that cannot be written to, in C order."""
+    """A read-only copy, in C order."""
     # Its memory is that of `bytes`, so that `setflags(write=True)` fails, too.
     array = np.asarray(values, dtype=np.float64)
     return np.ndarray(array.shape, np.float64, buffer=array.tobytes())

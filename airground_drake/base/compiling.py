@@ -1,4 +1,4 @@
-"""numba's `njit` for functions that are compiled once and kept, or anew in each process where nothing can be kept."""
+"""numba's `njit` with a cache on disk, or without one if no cache folder is writable."""
 
 import sys
 from collections.abc import Callable
@@ -17,7 +17,7 @@ _kind: Any = numba.types.unliteral
 
 
 def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """`numba.njit`; where numba finds no folder for its cache, it is said once, and nothing is kept."""
+    """`numba.njit`; if numba finds no cache folder, a message says so once, and nothing is cached."""
     options["no_cfunc_wrapper"] = True  # nobody calls them from C
 
     def compiled(function: Callable[..., Any]) -> Any:
@@ -34,7 +34,7 @@ def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _without_constants(template: Callable[..., Any]) -> Callable[..., Any]:
-    """numba's choice of what a call means; otherwise it compiles a function once more for each constant argument."""
+    """numba's dispatch without constant arguments, for each of which it would compile a function again."""
     return lambda args, named: template(tuple(map(_kind, args)), {name: _kind(of) for name, of in named.items()})
 
 

@@ -10,14 +10,14 @@ VALUE_WIDTH, FAULT_WIDTH, TRACEBACK_CHARS = 120, 300, 4000
 
 
 class AirgroundError(Exception):
-    """Base class of the package's own exceptions. What one says is one printable line."""
+    """Base class of the package's own exceptions. Its text is one printable line."""
 
     def __str__(self) -> str:
         return one_line(super().__str__())
 
 
 class Fault(str):
-    """A fault in words, if there is no single offending value to show."""
+    """A description of a fault without a single offending value."""
 
 
 class ScenarioError(AirgroundError):
@@ -41,7 +41,7 @@ class LimitError(AirgroundError):
     """A scenario that asks for more work than is allowed."""
 
     def __init__(self, scenario: str, asked: str, allowed: str) -> None:
-        """Keep the parts, with which it is pickled: `asked` and `allowed` are amounts in words."""
+        """Keep the arguments for pickling; `asked` and `allowed` are amounts in words."""
         super().__init__(scenario, asked, allowed)
 
     def __str__(self) -> str:
@@ -72,7 +72,7 @@ class PluginError(AirgroundError):
 
 
 class PolicyError(AirgroundError):
-    """A policy's process failed: the policy's own exception, or how the process ended, in words."""
+    """A policy's process failed; the message is the policy's exception, or how the process ended."""
 
     def __init__(self, what: str, traceback: str = "") -> None:
         super().__init__(what)
@@ -88,11 +88,11 @@ class ExportError(AirgroundError):
 
 
 class LogError(AirgroundError):
-    """A recorded log cannot be read, or cannot be judged for its scenario: one line says why, and what was wanted."""
+    """A recorded log cannot be read or judged; one line says why, and what is wanted."""
 
 
 class ReplayError(AirgroundError):
-    """A replay cannot be made on this machine: no port for Meshcat, no encoder for a video."""
+    """A replay cannot be made on this machine, for lack of a port for Meshcat or a video encoder."""
 
 
 class SimulationError(AirgroundError):
@@ -117,12 +117,12 @@ class TraceError(AirgroundError):
 
 
 def short(text: str) -> str:
-    """The text, cut to the length that a message may quote."""
+    """The text, truncated for a message."""
     return text if len(text) <= VALUE_WIDTH else f"{text[: VALUE_WIDTH - 3]}..."
 
 
 def described(error: BaseException, function: object = None) -> str:
-    """An exception of third-party code as one printable line of bounded length. Its `__str__` may raise, too."""
+    """An exception of third-party code as one printable line of bounded length, even if its `__str__` raises."""
     # function: of that code. If the exception passed its file, the line begins with the place, such as `boom.py:5`.
     try:
         text = f"{_place(error, function)}{type(error).__name__}: {error}"[:FAULT_WIDTH]
@@ -133,7 +133,7 @@ def described(error: BaseException, function: object = None) -> str:
 
 @contextmanager
 def raised_as(made: Callable[[BaseException], Exception]) -> Iterator[None]:
-    """Turn whatever third-party code raises in the body into an error that says so."""
+    """Convert any exception of third-party code in the body into an error of the package."""
     try:
         yield
     except (Exception, SystemExit) as error:
@@ -155,12 +155,12 @@ def printable(text: str) -> str:
 
 
 def _place(error: BaseException, function: object) -> str:
-    """The last place in the function's file that the exception passed, and a space; '' if it did not pass it."""
+    """The last line of the function's file in the traceback, and a space; '' if there is none."""
     file = getattr(getattr(function, "__code__", None), "co_filename", None)
     lines = [line for frame, line in walk_tb(error.__traceback__) if frame.f_code.co_filename == file]
     return f"{PurePath(str(file)).name}:{lines[-1]} " if lines else ""
 
 
 def one_line(text: str) -> str:
-    """The text with all characters escaped that break lines, control terminals or turn the direction of writing."""
+    """The text with characters escaped that break lines, control terminals or change the writing direction."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

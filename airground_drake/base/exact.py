@@ -1,4 +1,4 @@
-"""Numbers of a scenario as they are written."""
+"""Numbers of a scenario as exact decimals."""
 
 from fractions import Fraction
 from functools import lru_cache
@@ -11,6 +11,6 @@ def decimal(number: float) -> Fraction:
 
 
 def is_multiple(of: float, unit: float) -> bool:
-    """Whether a number is a whole multiple of a unit, at least once, but for rounding."""
+    """Whether a number is a positive integer multiple of a unit, up to rounding."""
     ratio = of / unit
     return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-9 * ratio

@@ -39,7 +39,7 @@ MOST_UNPACKED = 1_000_000_000  # most bytes of an unpacked table, or of its text
 
 
 def open_regular(path: Path, flags: int = os.O_RDONLY, *, links: bool = False) -> int:
-    """Open a regular file of a folder that may be hostile: not through a link, and without waiting."""
+    """Open a regular file of a possibly hostile folder, without following links or blocking."""
     # links: whether the path may be a link to a regular file: for paths that the user names.
     with suppress(FileNotFoundError):  # the flags may create it
         # asked before it is opened, too: opening a device may have effects
@@ -60,7 +60,7 @@ def _be_regular(about: os.stat_result, path: Path) -> None:
 
 
 def refuse_links(folder: Path) -> None:
-    """Refuse a folder of a stranger if folders in it are links: other files would be read or written through them."""
+    """Refuse a possibly hostile folder that contains links to folders."""
     # That is asked of a report or saved run before its files are opened; `open_regular` follows no link to a file.
     for path in chain(folder.glob("*"), folder.glob("*/*")):
         if path.is_symlink() and path.is_dir():
@@ -75,7 +75,7 @@ def open_pipe(path: Path) -> BinaryIO:
 
 
 def read_bytes(path: Path, most: int = LARGEST_FILE, *, links: bool = False) -> bytes:
-    """The content of a regular file that may be hostile; `links` as of `open_regular`."""
+    """The content of a possibly hostile regular file; `links` as in `open_regular`."""
     with open(open_regular(path, links=links), "rb") as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
@@ -168,7 +168,7 @@ def _sync(folder: Path) -> None:
 
 
 def discard_partial() -> None:
-    """Remove the temporary files and folders of this process, before it ends at once."""
+    """Remove the temporary files and folders of this process before it exits."""
     for name in tuple(_open):
         if os.path.isdir(name):
             shutil.rmtree(name, ignore_errors=True)
@@ -178,7 +178,7 @@ def discard_partial() -> None:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A folder that is removed at the end of the block or of this process; after a kill, by a later process."""
+    """A temporary folder, removed at the end of the block or process; after a kill, by a later process."""
     sweep_temporary()
     made = Path(tempfile.mkdtemp(prefix=f".{_TEMPORARY}"))
     folder = made.with_name(made.name[1:])
@@ -214,7 +214,7 @@ def is_partial(path: Path) -> bool:
 
 
 def try_to_write(folder: Path) -> None:
-    """Write a file to a folder and remove it; OSError as `write_bytes`."""
+    """Check that a folder is writable, by writing and removing a file; OSError like `write_bytes`."""
     probe = folder / f".{os.getpid()}.probe"
     write_bytes(probe, b"\n")
     probe.unlink()
@@ -222,7 +222,7 @@ def try_to_write(folder: Path) -> None:
 
 @contextmanager
 def wanted(path: Path, what: str) -> Iterator[None]:
-    """Turn an OSError of the block, which writes `what` to a path, into a FolderError with path, reason and `what`."""
+    """Convert an OSError of the block, which writes `what` to a path, into a FolderError."""
     try:
         yield
     except OSError as error:
@@ -231,14 +231,14 @@ def wanted(path: Path, what: str) -> Iterator[None]:
 
 
 def make_folder(folder: Path, what: str) -> None:
-    """Create a folder for `what` if it does not exist, and try to write to it; FolderError if that fails."""
+    """Create a folder for `what` if needed, and check that it is writable; FolderError if not."""
     with wanted(folder, f"a folder for {what}"):
         folder.mkdir(parents=True, exist_ok=True)
         try_to_write(folder)
 
 
 def try_to_create(path: Path) -> None:
-    """Write a new file, in a folder that is created, and remove it; FolderError if it exists or cannot be written."""
+    """Check that a new file can be written, creating its folder; FolderError if it exists or cannot be written."""
     if os.path.lexists(path):
         raise FolderError(f"{path} exists; name a file that does not")
     with wanted(path, "a file that can be written"):
@@ -247,7 +247,7 @@ def try_to_create(path: Path) -> None:
 
 
 def sweep(folder: Path) -> None:
-    """Remove the temporary files of killed processes in and below a folder."""
+    """Remove temporary files that killed processes left in or below a folder."""
     for path in folder.rglob(".*.partial"):
         if partial := _PARTIAL.fullmatch(path.name):
             try:
@@ -259,7 +259,7 @@ def sweep(folder: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text atomically; bytes of a path that are not UTF-8 are escaped, also as JSON has it."""
+    """Write UTF-8 text atomically; surrogates of paths that are not UTF-8 are escaped, also in JSON."""
     write_bytes(path, text.encode(errors="backslashreplace"))
 
 
@@ -269,7 +269,7 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def strict(value: Any, of_others: Callable[[float], Any] = lambda _: None) -> Any:
-    """Plain JSON types: values of numpy unwrapped, tuples as lists, numbers that are not finite as None."""
+    """Plain JSON types: numpy values unwrapped, tuples as lists, non-finite numbers as None."""
     # of_others: what else becomes of numbers that are not finite.
     if isinstance(value, Mapping):
         return {str(key): strict(item, of_others) for key, item in value.items()}

@@ -1,4 +1,4 @@
-"""A sequence that only grows, for states that are copied at every change."""
+"""An immutable sequence with cheap append, for states that are copied at every change."""
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -17,7 +17,7 @@ class Immutable:
 
 
 class History(Immutable, Sequence[Entry], Generic[Entry]):
-    """What happened so far. `plus` leaves the history as it was, and costs as much as what is more."""
+    """An immutable sequence of past entries. `plus` returns a longer one, at the cost of the added entries."""
 
     # A history shares its list with the one that it was made from. A second continuation of the same history gets a
     # list of its own.

@@ -44,7 +44,7 @@ _exit_code: int | None = None
 
 
 def begin() -> None:
-    """Begin a command, before the imports that take seconds: see this module."""
+    """Begin a command, before the slow imports; see the module."""
     gc.set_threshold(100_000)  # what is imported stays: to look for garbage among it took an eighth of the imports
     has_home = os.path.isabs(os.path.expanduser("~"))
     for name, value in (CURRENT_FOLDER if has_home else CURRENT_FOLDER | NO_HOME).items():
@@ -59,7 +59,7 @@ def begin() -> None:
 
 
 def _go_on_in_a_child() -> None:
-    """Return in a child process. The parent waits for it, cleans up after it, and leaves with its exit code."""
+    """Return in a child process. The parent waits for it, cleans up, and exits with its code."""
     # The parent adopts orphans among the child's descendants, and so finds all of them if the child is killed.
     global _exit_code
     told, _exit_code = os.pipe()
@@ -93,7 +93,7 @@ def _go_on_in_a_child() -> None:
 
 
 def ended_how(code: int) -> str:
-    """The exit code of a process in words; negative codes are signals."""
+    """How a process ended, from its exit code; negative codes are signals."""
     return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
@@ -127,12 +127,12 @@ def end_on_signals() -> None:
 
 
 def _heeded() -> list[signal.Signals]:
-    """Those of `STOPPING` that are not ignored, as by `nohup`."""
+    """The signals in `STOPPING` that are not ignored (as by `nohup`)."""
     return [number for number in STOPPING if signal.getsignal(number) is not signal.SIG_IGN]
 
 
 def _open_standard_streams() -> None:
-    """Point closed streams to the null device; otherwise the next file that is opened takes their place."""
+    """Open closed standard streams on the null device, so that no other file gets their descriptors."""
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             nowhere = os.open(os.devnull, os.O_RDWR)  # the least descriptor that is free
@@ -161,7 +161,7 @@ def run(main: Callable[[], int]) -> NoReturn:
 
 
 def leave(code: int) -> NoReturn:
-    """Exit at once after the work is done: while an interpreter shuts down, it has no signal handlers."""
+    """Exit at once after the work is done, because the interpreter has no signal handlers while it shuts down."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # a closed pipe or stream
             stream.flush()
@@ -169,7 +169,7 @@ def leave(code: int) -> NoReturn:
 
 
 def end_descendants() -> None:
-    """Kill every process below this one, until /proc shows none: one that is killed may have begun another."""
+    """Kill all descendants, repeatedly until /proc shows none, because they may start others."""
     # A process keeps its locks until it has ended. Temporary folders are removed by these locks.
     until = time.monotonic() + PATIENCE_S
     while (descendants := _descendants()) and time.monotonic() < until:
@@ -180,7 +180,7 @@ def end_descendants() -> None:
 
 
 def _descendants() -> list[int]:
-    """Living processes whose parent, or its parent, and so on, is this one."""
+    """Living descendants of this process."""
     children: dict[int, list[int]] = {}
     for entry in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Limits of names, counts and texts in a scenario file. They are here so that their users need not import pydantic."""
+"""Limits of names, counts and texts in a scenario file, separate so that their users need not import pydantic."""
 
 MAX_UGVS, MAX_SEED, MAX_STAGES = 100, 2**31 - 1, 1000
 MAX_NAME, MAX_TEXT = 64, 10_000  # characters

@@ -1,7 +1,7 @@
 """Independent pieces of work in processes forked from this one, as many at a time as there are processors.
 
-A piece sees everything that existed before the first piece began; only its result is kept. A process does several
-pieces, one after the other, which share imports and loaded data.
+A piece sees the data that existed before the first piece began; only its result is returned. A process does several
+pieces one after the other, which share imports and loaded data.
 """
 
 import multiprocessing
@@ -27,12 +27,12 @@ _pieces: Sequence[Callable[[], object]] = ()
 
 
 def forks() -> bool:
-    """Whether a process may be forked here."""
+    """Whether forking is allowed here."""
     return "fork" in multiprocessing.get_all_start_methods() and sys.platform != "darwin"
 
 
 def one_thread_each() -> None:
-    """Give libraries that are loaded later one thread: as many processes as processors will use them."""
+    """Limit libraries that are loaded later to one thread, because there is a process for each processor."""
     for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR"):
         os.environ.setdefault(f"{name}_NUM_THREADS", "1")
 
@@ -44,7 +44,7 @@ def processors() -> int:
 
 @contextmanager
 def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of `jobs` processes. Processes that still work at the end of the block are killed."""
+    """A pool of `jobs` processes, killed at the end of the block."""
     # An AirgroundError is raised if a process has died, and nobody in the block has noticed.
     # The first call forks them, and they see everything that exists then. Where forking is not safe, they start empty.
     # Calls and results are pickled.

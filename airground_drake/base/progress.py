@@ -14,13 +14,13 @@ TOLD_S = 3.0  # where standard error is no terminal, a stage that lasts longer g
 
 
 class Progress:
-    """Receives the progress of long work. This class shows nothing. Several threads may call it."""
+    """Interface for progress reports of long work; thread-safe. This base class shows nothing."""
 
     def stage(self, name: str, amount: float = 0.0, unit: str = "") -> None:
-        """Begin a stage with an amount of work in it (0: unknown), and end the stage before."""
+        """Begin a stage with an amount of work (0: unknown), and end the previous one."""
 
     def advance(self, amount: float, what: str = "") -> None:
-        """Add an amount of finished work, the last of it on `what`."""
+        """Add an amount of finished work, most recently on `what`."""
 
     def elapsed_s(self, what: str, seconds: float) -> None:
         """Report the time of a part, s."""
@@ -41,7 +41,7 @@ class ProgressBar(Progress):
     """Shows progress on standard error: a bar or a line for the stage, a line for each part that took time."""
 
     def __init__(self, *, bar: bool, lines: bool, stages: bool = False) -> None:
-        """Choose a bar for the current stage, lines for finished parts, and one line for a stage that takes long."""
+        """Choose a bar for the current stage, lines for finished parts, and a line for a long stage."""
         self._shows_bar, self._shows_lines, self._shows_stages = bar, lines, stages
         self._bar: Any = None
         self._stage = self._of = ""
@@ -69,7 +69,7 @@ class ProgressBar(Progress):
                 self._bar.update(amount)
 
     def elapsed_s(self, what: str, seconds: float) -> None:
-        """Print a line, if lines are wanted and the part was not too short."""
+        """Print a line, if lines are enabled and the part was not too short."""
         if self._shows_lines and seconds >= SHOWN_S:
             with self._lock:
                 if self._bar is not None:
@@ -99,7 +99,7 @@ def progress_bar(*, quiet: bool = False, verbose: bool = False) -> Iterator[Prog
 
 
 def _bar(name: str, amount: float, unit: str) -> Any:
-    """A bar of tqdm in one line that is erased at its end, without a thread of its own."""
+    """A tqdm bar, erased at its end, without a monitor thread."""
     from tqdm import tqdm
 
     tqdm.monitor_interval = 0

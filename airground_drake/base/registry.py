@@ -1,4 +1,4 @@
-"""Every name that a scenario or command line can use, declared once.
+"""The registry of names that a scenario or command line can use.
 
 Validation, command line, report and documentation look names up here. A class is imported when it is used. A registry
 also has the entry points of installed packages, and accepts `module:Class` for any importable class and `file.py:Class`
@@ -37,7 +37,7 @@ PLUGIN_PATTERN = rf"^({_WORD}(\.{_WORD})*|([\w-]+/)*[\w-]+\.py):{_WORD}$"  # thi
 
 
 class Registry:
-    """Classes of one kind by name: the package's own, those of entry points, and those of the form `PLUGIN`."""
+    """Classes of one kind by name: the package's own, entry points, and names of the form `PLUGIN`."""
 
     def __init__(self, kind: str, plural: str, own: Mapping[str, str]) -> None:
         """Declare the package's own classes.
@@ -66,7 +66,7 @@ class Registry:
 
     @property
     def others(self) -> Registry:
-        """The registry without the package's own classes."""
+        """This registry without the package's own classes."""
         return Registry(self.kind, self.group.rpartition(".")[2], {})
 
     @property
@@ -75,11 +75,11 @@ class Registry:
         return (*self, PLUGIN)
 
     def accepts(self, name: str) -> bool:
-        """Whether a name is registered, or has the form of `PLUGIN`; nothing is imported."""
+        """Whether a name is registered or has the form of `PLUGIN`; nothing is imported."""
         return name in self or is_plugin(name)
 
     def is_foreign(self, name: str) -> bool:
-        """Whether a name stands for third-party code: neither the package's own nor added here."""
+        """Whether a name is third-party code: neither the package's own nor added in this process."""
         return name not in self._own and name not in self._added
 
     def says(self, name: str) -> str:
@@ -144,7 +144,7 @@ class Registry:
             raise PluginError(f"{self.kind} {name!r} with {parameters}: {why}") from None
 
     def misfit(self, name: str, parameters: Mapping[str, Any]) -> str:
-        """Why the class refuses these parameters, and which it takes; '' if it takes them, or is third-party."""
+        """Why the class refuses these parameters, and those that it takes; '' if it takes them, or is third-party."""
         return "" if self.is_foreign(name) else _misfit(self.load(name, object), parameters)
 
     @contextmanager
@@ -158,7 +158,7 @@ class Registry:
 
 
 def _misfit(kind: type, parameters: Mapping[str, Any]) -> str:
-    """Why a class refuses these parameters, and which it takes; '' if it accepts them, or has no signature."""
+    """Why a class refuses these parameters, and those that it takes; '' if it accepts them or has no signature."""
     try:
         signature = inspect.signature(kind)
     except (TypeError, ValueError):
@@ -179,7 +179,7 @@ def parameters(kind: type) -> list[str]:
 
 
 def is_plugin(name: str) -> bool:
-    """Whether a name has the form `module:Class` or, with folders or without, `file.py:Class`."""
+    """Whether a name has the form `module:Class` or `folders/file.py:Class`."""
     return re.fullmatch(PLUGIN_PATTERN, name) is not None
 
 
@@ -194,7 +194,7 @@ def source_of(place: str) -> Path | None:
 
 
 def _imported(module: str) -> ModuleType:
-    """Import a module by its name, or by a file in a folder of Python's path (the last folder is searched first)."""
+    """Import a module by name, or a file in a folder of Python's path; the last folder is searched first."""
     if not module.endswith(".py"):
         return importlib.import_module(module)
     if (path := _on_path(module)) is None:
@@ -209,7 +209,7 @@ def _on_path(file: str) -> Path | None:
 
 
 def _executed(path: Path) -> ModuleType:
-    """Import a file, under a name that no other file has."""
+    """Import a file under a unique module name."""
     name = f"{path.stem}_{sha256(str(path).encode())[:12]}"
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(name, path)
@@ -225,7 +225,7 @@ def _executed(path: Path) -> ModuleType:
 
 
 def _places() -> str:
-    """Python's path in words: added folders, the last one first, then Python's own."""
+    """A description of Python's path: added folders, the last one first, then Python's own."""
     own = tuple({sys.prefix, sys.base_prefix})
     added = [os.path.abspath(folder) for folder in reversed(sys.path) if not folder.startswith(own)]
     return ", ".join([*dict.fromkeys(added), "Python's own folders"])
@@ -330,7 +330,7 @@ SAMPLERS = Registry(
 
 
 def _claims(identifiers: str) -> dict[str, str]:
-    """The class of each claim, in the file of its name: SAFE-TRACE is `SafeTrace` in safe_trace.py."""
+    """The class of each claim: SAFE-TRACE is `SafeTrace` in safe_trace.py."""
     place = "airground_drake.verify.claims.{}:{}"
     return {
         claim: place.format(claim.lower().replace("-", "_"), claim.title().replace("-", ""))

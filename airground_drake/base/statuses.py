@@ -27,7 +27,7 @@ def alternatives(expected: str) -> tuple[str, ...]:
 
 
 def declared(expected: str) -> str:
-    """An expectation as it counts: one that admits both an established and a refuted claim expects nothing."""
+    """The effective expectation: one that admits both established and refuted claims expects nothing."""
     admitted = alternatives(expected)
     either = "refuted" in admitted and any(status in (*PASSING, EXERCISED) for status in admitted)
     return NOTHING if either else expected

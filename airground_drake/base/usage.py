@@ -1,4 +1,4 @@
-"""The values that options of commands take, and how a command refuses."""
+"""Parsers of option values, and the refusal of a command."""
 
 import argparse
 import math
@@ -20,7 +20,7 @@ MOST_JOBS = 1000  # most processes that a command starts at once
 
 
 def refuse(why: object, code: int = EXIT_USAGE) -> int:
-    """Print in one line why a command is not done, if standard error takes it; returns the exit code."""
+    """Print one line on why a command is refused, if standard error is open; returns the exit code."""
     if isinstance(why, OSError) and why.filename is not None:
         why = f"{why.filename}: {why.strerror}"
     with suppress(OSError):
@@ -29,7 +29,7 @@ def refuse(why: object, code: int = EXIT_USAGE) -> int:
 
 
 def output_folder(text: str) -> Path:
-    """Parse the path of an output; `new/../b` becomes `b`: else writing would create `new` on the way."""
+    """Parse an output path, normalised: writing to `new/../b` would otherwise create `new`."""
     return Path(os.path.relpath(os.path.realpath(text)) if ".." in Path(text).parts else text)
 
 
@@ -40,7 +40,7 @@ def output_file(text: str) -> Path:
 
 
 def _reader(read: Callable[[str], N], fits: Callable[[N], bool], wanted: str) -> Callable[[str], N]:
-    """Make the parser of a number that has to fit."""
+    """Make the parser of a number within bounds."""
 
     def number(text: str) -> N:
         with suppress(ValueError):
@@ -52,13 +52,13 @@ def _reader(read: Callable[[str], N], fits: Callable[[N], bool], wanted: str) ->
 
 
 def whole(least: int, most: float = math.inf) -> Callable[[str], int]:
-    """Make the parser of a whole number; `least` and `most` are allowed."""
+    """Make the parser of a whole number from `least` to `most`."""
     up_to = "on" if most == math.inf else f"to {most}"
     return _reader(int, lambda value: least <= value <= most, f"a whole number from {least} {up_to}")
 
 
 def between(least: float, most: float) -> Callable[[str], float]:
-    """Make the parser of a number; `least` and `most` are allowed."""
+    """Make the parser of a number from `least` to `most`."""
     return _reader(float, lambda value: least <= value <= most, f"a number from {least:g} to {most:g}")
 
 

@@ -1,4 +1,4 @@
-"""Kinds of plain values in files that users write: pydantic's annotations, and the errors of what breaks a rule."""
+"""Types of plain values in users' files: pydantic annotations, and their errors."""
 
 import math
 import unicodedata
@@ -20,24 +20,24 @@ RECORDED = "recorded"  # pydantic's context for the scenario in a run's metadata
 
 
 def refused(value: object, allowed: str, *at: str) -> PydanticCustomError:
-    """The error of a value that breaks a rule; `allowed` states the rule, `at` the place within the checked value."""
+    """The error of a value that violates a rule; `allowed` states the rule, `at` its place in the value."""
     return PydanticCustomError("rule", "{allowed}", {"value": value, "allowed": allowed, "at": at})
 
 
 def wanted(words: str, **bounds: Any) -> Any:
-    """The bounds of a key's value, and what messages say is wanted."""
+    """The bounds of a key's value, and their description in messages."""
     return Field(json_schema_extra={WANTED: words}, **bounds)
 
 
 def as_float(value: object) -> object:
-    """A whole number as a floating-point number; infinite if it is too large."""
+    """An integer as a float; infinite if it is too large."""
     if type(value) is not int:
         return value
     return float(value) if abs(value) < 1e300 else math.inf
 
 
 def visible(text: str) -> str:
-    """Refuse text with characters that could disguise it where it is shown."""
+    """Refuse text with invisible characters that could disguise it."""
     if not text.isprintable() and (hidden := next(filter(_is_hidden, text), None)):
         raise refused(hidden, "text without control characters and without marks that turn the direction of writing")
     return text
@@ -87,7 +87,7 @@ class ValueRule:
 
 
 def _within_a_turn(heading: float) -> float:
-    """Refuse headings of more than one turn: greater ones are degrees."""
+    """Refuse headings of more than one turn, which are probably in degrees."""
     if abs(heading) > math.tau + SMALLEST:
         degrees = f"{heading:g} degrees are {math.radians(heading):.6g} rad"
         raise refused(heading, f"from -{math.tau:.6g} to {math.tau:.6g} rad; {degrees}")

@@ -11,7 +11,7 @@ from .command import main
 
 
 def _end(number: int, frame: FrameType | None) -> NoReturn:
-    """One line, and the exit code that stands for the signal."""
+    """Print one line, and exit with the signal's code."""
     os.write(2, f"error: interrupted ({signal.Signals(number).name})\n".encode())
     os._exit(128 + number)
 

@@ -1,4 +1,4 @@
-"""The command line of the checker. It imports what checks need only when there is something to check."""
+"""The command line of the checker. The checks' dependencies are imported only when needed."""
 
 import argparse
 import json
@@ -34,7 +34,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser(prog: str, description: str, epilog: str) -> argparse.ArgumentParser:
-    """What the command line takes; it raises `UsageError`."""
+    """The parser of the command line, which raises `UsageError`."""
     parser = _Parser(
         prog=prog, description=description, epilog=epilog, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -53,7 +53,7 @@ def _limit_s(text: str) -> float:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Check a report and print what was found. Returns the exit code: 0 all agree, 1 not all, 2 usage or no report."""
+    """Check a report and print the results. Returns the exit code: 0 all agree, 1 not all, 2 usage or no report."""
     # arguments: of the command line; default: those of the process.
     says = "Judge distances, hypotheses, triggers, dwell, arrivals and collisions of a report again, from its files."
     try:
@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def checked(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = bool) -> list[CheckLine]:
-    """All checks of a report, without warnings of numpy; `told` is called with each when it is done."""
+    """All checks of a report, without numpy's warnings; `told` is called with each result."""
     import numpy as np
 
     from .report import check_report
@@ -93,7 +93,7 @@ def verdict(lines: Sequence[CheckLine]) -> int:
 
 
 def show(lines: Sequence[CheckLine], folder: Path, taken: Sequence[str], *, as_json: bool) -> None:
-    """Print the checks, a line each, or as strict JSON; and what is taken as recorded."""
+    """Print the checks, a line each or as strict JSON, and the parts that are taken as recorded."""
     counts = Counter(line.outcome for line in lines)
     if as_json:
         checks = [_strict(asdict(line)) for line in lines]
@@ -107,12 +107,12 @@ def show(lines: Sequence[CheckLine], folder: Path, taken: Sequence[str], *, as_j
 
 
 def _printable(text: str) -> str:
-    """Make one line without control characters, whatever names are in it."""
+    """The text as one line without control characters."""
     return "".join(c if c.isprintable() else " " if c.isspace() else c.encode("unicode_escape").decode() for c in text)
 
 
 def _strict(value: Any) -> Any:
-    """Plain JSON; numbers that are not finite, and values that JSON does not have, become text."""
+    """Strict JSON; non-finite numbers and other types become text."""
     if isinstance(value, dict):
         return {str(key): _strict(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

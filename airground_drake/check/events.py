@@ -1,4 +1,4 @@
-"""Arrivals and collisions: they follow from the positions of a run."""
+"""Arrivals and collisions, recomputed from the positions of a run."""
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest

@@ -28,7 +28,7 @@ THRIFT = 10_000_000  # bytes of a text, and entries of a list, in the metadata o
 
 
 def is_plain(name: Any) -> bool:
-    """Whether a value is the name of a file or folder, without a path."""
+    """Whether a value is a plain file or folder name, without a path."""
     return isinstance(name, str) and name not in ("", ".", "..") and not {*"/\\\0"} & {*name} and name.isprintable()
 
 
@@ -64,7 +64,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def sha256(content: bytes) -> str:
-    """SHA-256 of a content, hexadecimal."""
+    """Hexadecimal SHA-256."""
     return hashlib.sha256(content).hexdigest()
 
 

@@ -23,7 +23,7 @@ MOST = {
 
 
 def is_of_a_size(scenario: Json) -> None:
-    """Refuse a scenario whose numbers would make the check endless."""
+    """Refuse a scenario that is too large to be checked."""
     numbers = dict(_numbers(scenario))
     for path, value in numbers.items():
         if not abs(value) <= LARGEST:
@@ -54,7 +54,7 @@ def _numbers(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str
 
 @contextmanager
 def at_most_s(limit_s: float) -> Iterator[None]:
-    """Stop a block after so much CPU time; this works in the main thread, and not on Windows."""
+    """Stop the block after this CPU time (main thread only, not on Windows)."""
 
     def over(_signal: int, _frame: FrameType | None) -> None:
         raise NotEstablished("the check comes to an end", f"not within {limit_s:g} s")

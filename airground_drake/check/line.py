@@ -1,4 +1,4 @@
-"""What is said of one check."""
+"""The result of one check."""
 
 from dataclasses import dataclass
 from typing import Any

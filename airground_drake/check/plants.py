@@ -1,14 +1,14 @@
-"""Bodies that are not where the law steers them: what they take, and how they move.
+"""Plants whose bodies are off their steered points: cost in distance, and motion.
 
-The law steers a point that goes straight from row to row. Of the body the plant says:
+The law steers a point that moves straight from row to row. The body moves according to the plant:
 
     unicycle   the axle is l behind the hand point, which goes along an arc with the same ends in each control period
     ackermann  the same of the rear axle of a car
     delay      the body is where the steered point was
     lag        tau v' = u - v; the steered point is p + tau v
 
-A user's plant is a class that is not here. Its drift and its cover are declared; what the trace records of both
-is compared with the recorded places.
+The class of a user's plant is not available here. Its drift and cover are declared; the recorded values of both are
+compared with the recorded positions.
 """
 
 import math
@@ -29,7 +29,7 @@ MOST_PARTS = 5000
 
 
 class Taken(NamedTuple):
-    """What the plant of a robot takes: of length, m; lag and delay, s; and the limit of its commands, m/s."""
+    """The numbers of a robot's plant: lengths, m; lag and delay, s; and the limit of its commands, m/s."""
 
     # A drift takes `drift_m` of a distance, and `slip_m` in one period. `drawn_m` is the part of `body_m` by which a
     # robot that never drives backwards is behind its steered point.
@@ -49,12 +49,12 @@ class Taken(NamedTuple):
 
 
 def plants_of(robot: Json) -> list[Json]:
-    """The plants of a robot but for those that move as they are told."""
+    """The plants of a robot, without first-order ones."""
     return [plant for plant in robot["plant"] if plant["kind"] != "first_order"]
 
 
 def unicycle_of(robot: Json) -> Json | None:
-    """The plant of a robot that is a unicycle or a car."""
+    """The unicycle or car among a robot's plants."""
     return next((plant for plant in robot["plant"] if plant["kind"] in DRIVES), None)
 
 
@@ -69,7 +69,7 @@ def least_radius_m(drive: Json) -> float:
 
 
 def own_of(robot: Json) -> Json | None:
-    """The plant of a robot that is a class of the user's."""
+    """The user's own class among a robot's plants."""
     return next((plant for plant in robot["plant"] if plant["kind"] not in KINDS), None)
 
 
@@ -87,7 +87,7 @@ def taken(robot: Json, control: Json) -> Taken:
 
 
 def _dip_m(drive: Json, chord_m: float, period_s: float) -> float:
-    """|omega| ||w|| h^2 / 8 for the largest turn, where the hand point goes ||w|| h along an arc with this chord."""
+    """|omega| ||w|| h^2 / 8 for the largest turn, when the hand point moves ||w|| h along an arc with this chord."""
     turns = [drive["max_turn_rad_s"]] if drive.get("max_turn_rad_s") else []
     if drive.get("wheel_base_m"):
         turns.append(2.0 * drive["max_wheel_speed_m_s"] / drive["wheel_base_m"])
@@ -139,7 +139,7 @@ class Way(NamedTuple):
         return 0.0
 
     def within(self, row: int, parts: int) -> Array:
-        """Places at equal times from a row to the next, (parts + 1, 3), m."""
+        """Positions at equal time steps between two rows, (parts + 1, 3), m."""
         begin, end = self.place_m[row], self.place_m[row + 1]
         share = np.linspace(0.0, 1.0, parts + 1)
         if self.heading_rad is not None and (turn := float(self.heading_rad[row + 1] - self.heading_rad[row])):
@@ -186,7 +186,7 @@ def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command
 def misses_as_recorded(
     robot: str, way: Way, steered: Array, command: Array, rows: Rows, recorded: tuple[Array, Array]
 ) -> None:
-    """Check what is recorded of a user's plant, period by period."""
+    """Check the recorded drift and cover of a user's plant, period by period."""
     # steered: (T, 3), m; command: (S, 3), m/s; rows: (S + 1,)
     # recorded: drift, m/s, and cover, m, (S,) each.
     lasting, t_s = np.diff(way.t_s[rows]), way.t_s[rows[:-1]]
@@ -201,7 +201,7 @@ def misses_as_recorded(
 
 
 def _axle(drive: Json, way: Way, steered: Array, command: Array, period_s: float) -> tuple[Array, Array]:
-    """Headings, (T,), and axles, (T, 3), of a unicycle, from its heading at the start on."""
+    """Headings, (T,), and axles, (T, 3), of a unicycle, from its start heading."""
     hand = float(drive["hand_point_m"])
     begun = 0
     heading = float(drive["heading_rad"])

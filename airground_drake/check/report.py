@@ -148,7 +148,7 @@ def _judged(claim: Json, ours: Found) -> str:
 
 
 def _attempt(limit_s: float, claim: str, run: str, check: Callable[[], str]) -> CheckLine:
-    """The line of a check; an exception in it is not agreement."""
+    """The line of a check; an exception counts as no agreement."""
     line = partial(CheckLine, claim, run)
     try:
         with at_most_s(limit_s):

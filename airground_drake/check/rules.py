@@ -1,4 +1,4 @@
-"""Rules of the checker, and what is said when one is broken: its name, where and when, and both values.
+"""Rules of the checker. A broken rule is reported with its name, place, time and both values.
 
 A rule is a call of `same`, `close` or `holds` with a name, the recorded and the recomputed value.
 """
@@ -19,7 +19,7 @@ SMALL = 1e-9
 
 @dataclass(eq=False)
 class Disagreement(Exception):  # noqa: N818 - what the program looks for, not an error of the program
-    """The files break a rule: they say `recorded`, where `recomputed` follows from them."""
+    """The files violate a rule: `recorded` differs from `recomputed`."""
 
     # `about` is the robot, pair, event, decision or file; `t_s` is the time in the run, s, if there is one.
 
@@ -41,7 +41,7 @@ class NotEstablished(Exception):  # noqa: N818
 
 @dataclass(frozen=True)
 class Found:
-    """What the checker's own formula gives for a claim."""
+    """The checker's own result for a claim."""
 
     status: str  # the verdict
     margin: float | None = None  # distance from refutation; None where the claim has no number
@@ -96,7 +96,7 @@ def holds(
 
 
 def _entry(values: Any, k: int | None) -> Any:
-    """Entry k along the first axis, as plain numbers; a text, None or a single number is the same for all entries."""
+    """Entry k along the first axis, as plain numbers; a text, None or a single number applies to all entries."""
     if values is None or isinstance(values, str) or np.ndim(values) == 0:
         return values.item() if isinstance(values, (np.ndarray, np.generic)) else values
     entries = np.asarray(values).tolist()

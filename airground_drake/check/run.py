@@ -37,7 +37,7 @@ LIFETIME = (("appears_s", 0.0), ("disappears_s", math.inf))
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run; T rows. The points that the law steers move straight from row to row."""
+    """One run with T rows. Steered points move straight from row to row."""
 
     name: str  # of the run in its scenario
     scenario: Json  # as resolved, with the values that the run sets
@@ -51,17 +51,17 @@ class Run:
 
     @cached_property
     def robots(self) -> dict[str, Json]:
-        """What the scenario says of each robot."""
+        """The scenario's entry of each robot."""
         return robots_of(self.scenario)
 
     @cached_property
     def pairs(self) -> list[Pair]:
-        """Pairs of bodies that are there for a control period, and the distances that they must keep."""
+        """Pairs of bodies that both exist for a control period, and the distances that they must keep."""
         return [pair for pair in pairs_of(self.scenario) if self.there(pair.other).start < len(self.t_s)]
 
     @cached_property
     def apart_m(self) -> dict[tuple[str, str], float]:
-        """Lower bound of the distance of each pair, m, so that only near pairs are looked at closely."""
+        """Lower bound of the distance of each pair, m, to skip distant pairs."""
         box = {name: boxes_of(place) for name, place in self.body_m.items()}
         bounds_m = {}
         for pair in self.pairs:
@@ -125,27 +125,27 @@ class Run:
         return moving_of(self.scenario)
 
     def apart(self, pair: Pair) -> Array:
-        """Places of the body of a pair's robot relative to the other's while both are there, (K, 3), m."""
+        """Positions of a pair's robot body relative to the other's while both exist, (K, 3), m."""
         return (self.body_m[pair.robot] - self.body_m[pair.other])[self.there(pair.other)]
 
     def steered_apart(self, pair: Pair) -> Array:
-        """Places of the steered point of a pair's robot relative to the other's while both are there, (K, 3), m."""
+        """Positions of a pair's steered point relative to the other's while both exist, (K, 3), m."""
         return (self.position_m[pair.robot] - self.position_m[pair.other])[self.there(pair.other)]
 
     def fine(self, name: str, row: int, parts: int) -> Array:
-        """Where a body, or the origin of an obstacle's shape, is from a row to the next, (parts + 1, 3), m."""
+        """Positions of a body, or of the origin of an obstacle's shape, between two rows, (parts + 1, 3), m."""
         way = self.ways.get(name) or Way(self.t_s, self.position_m[name])
         return way.within(row, parts)
 
     def there(self, name: str) -> slice:
-        """Rows in which a body is there; they start at the number of rows if it is not there for a control period."""
+        """Rows in which a body exists; they start at the number of rows if it does not exist for a control period."""
         # It is there from the first control sample at or after its `appears_s` to that at or after its `disappears_s`.
         body = self.scenario["obstacles"].get(name, {})
         first, last = (self._row_at(float(body.get(key) or never)) for key, never in LIFETIME)
         return slice(first if first < last else len(self.t_s), last + 1)
 
     def period_rows(self, name: str) -> Rows:
-        """Ends of the control periods in which a body is there: rows of control samples, and the last row."""
+        """Ends of the control periods in which a body exists: rows of control samples, and the last row."""
         rows = np.append(self.sample_row, len(self.t_s) - 1)
         there = self.there(name)
         return rows[(rows >= there.start) & (rows < there.stop)]
@@ -176,7 +176,7 @@ class Run:
 
     @cached_property
     def error_m(self) -> float:
-        """How far measured positions may be off, m."""
+        """Error bound of measured positions, m."""
         return float((self.scenario.get("sensing") or {}).get("position_error_m", 0.0))
 
     @cached_property
@@ -205,7 +205,7 @@ def column_of(table: pd.DataFrame, name: str) -> Array:
 
 
 def read_run(folder: Path, name: str, report: Json) -> Run:
-    """Read a trace, and check the rules that all claims about it rest on."""
+    """Read a trace, and check the rules on which all claims about it depend."""
     scenario = report["scenario"]["resolved"]
     meta = read_json(folder / "meta.json")
     content = {table: read_bytes(folder / table) for table in TABLES}

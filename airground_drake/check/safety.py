@@ -1,4 +1,4 @@
-"""SAFE-TRACE, SAFE-OWN and SAFE-HYP: distances of a run, whose doing they were, and hypotheses of the safety theorem.
+"""SAFE-TRACE, SAFE-OWN and SAFE-HYP: distances of a run, who caused them, and hypotheses of the safety theorem.
 
 Beside an obstacle that is expected to move at most at V the passive law is in force: n.v >= -(D - d - V h) / h where
 D >= d + V h, else n.v >= 0. It is the other inequality with d + V h in place of d, and without a gain.
@@ -23,7 +23,7 @@ FAR_M = 1e-6  # largest error of a distance in floating point, m; pairs that are
 
 
 def safe_trace(run: Run) -> Found:
-    """SAFE-TRACE: the distance of each pair is at least the safe one at every time; of several parts, the least."""
+    """SAFE-TRACE: the distance of each pair, the least over its parts, is at least the safe one at all times."""
     # A pair tests the claim if it comes so near that one period at the speed limits could break it, or what the law
     # keeps between the points that it steers.
     margin, least, most = np.inf, 0, 0
@@ -44,7 +44,7 @@ def safe_trace(run: Run) -> Found:
 
 
 def _least_m(run: Run, pair: Pair, enough: float) -> float:
-    """The least distance of a pair, m, at most `enough`; where bodies bend too near, their ways are divided."""
+    """The least distance of a pair, m, at most `enough`; curved paths are divided where that matters."""
     apart, bent = run.apart(pair), run.bent_m(pair)
     least_m = pair.shape.least_m(apart, enough + bent) - bent
     if not bent or least_m >= pair.safe_m:
@@ -62,7 +62,7 @@ def _least_m(run: Run, pair: Pair, enough: float) -> float:
 
 
 def _parts(bent_m: float) -> int:
-    """Into how many parts a way that is bent is divided, so that each is straight."""
+    """Number of parts of a curved path, so that each is straight."""
     return min(math.ceil(math.sqrt(bent_m / STRAIGHT_M)), MOST_PARTS)
 
 
@@ -134,7 +134,7 @@ def _root(square: Fraction) -> tuple[Fraction, Fraction]:
 def _missed_m(
     away: Away, step: list[Fraction], safe: Fraction, share: Fraction, gain: Fraction, point: bool
 ) -> Fraction:
-    """Upper bound of what a step lacks of its share of the avoidance inequality, m; at least 0."""
+    """Upper bound of a step's violation of its share of the avoidance inequality, m; at least 0."""
     # gain: A h, at most 1.
     least, most = _root(sum((c * c for c in away.vector), Fraction()))
     if not least:  # the law may take either side of a wall, and beside a point any unit vector
@@ -151,7 +151,7 @@ def gain_of(scenario: Json, period_s: float) -> Fraction:
 
 
 class Shortfall(NamedTuple):
-    """What the inequalities of a pair lack in one period, m: the robot's own share, and that of the other robot."""
+    """Violations of a pair's inequalities in one period, m: by the robot, and by the other robot."""
 
     own: Fraction
     other: Fraction
@@ -164,7 +164,7 @@ class Shortfall(NamedTuple):
 def shortfall_m(
     own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1), seen_m: Array | None = None
 ) -> Fraction:
-    """The largest sum of what a pair's inequalities lack at one sample, m per period, in exact arithmetic."""
+    """The largest violation of a pair's inequalities at one sample, m per period, in exact arithmetic."""
     # own_m, other_m: (K + 1, 3); seen_m: see `shortfalls_m`
     # gain: A h.
     # last: length of the last period, in periods; its step is extended to a whole one.
@@ -178,7 +178,7 @@ def shortfalls_m(
     own_m: Array, other_m: Array, pair: Pair, safe_m: Sequence[float], gain: Sequence[Fraction],
     lasts: Sequence[Fraction] = (), seen_m: Array | None = None,
 ) -> dict[int, Shortfall]:  # fmt: skip
-    """What a pair's inequalities lack in each of K periods, by the period's number, where they lack something."""
+    """Violations of a pair's inequalities, by period, for the periods with a violation."""
     # There is an inequality for each convex part of what is avoided; the largest shortfall counts. Samples at which the
     # two cannot meet within a period, whatever their direction, need none.
     # own_m, other_m: (K + 1, 3); safe_m, gain: (K,)
@@ -225,7 +225,7 @@ def gain_of_pair(pair: Pair, gain: Fraction) -> Fraction:
 
 
 def measured_shortfall_m(run: Run, law: Pair, rows: Rows, gain: Fraction, last: Fraction) -> Fraction:
-    """The largest amount that a pair lacks at one sample of the inequality of its measured positions, m per period."""
+    """The largest violation of a pair's inequality with measured positions, m per period."""
     # The steps are true ones. A pair that stands lacks nothing, nor does one that is far.
     samples = np.searchsorted(run.sample_row, rows[:-1])
     own_m, other_m = run.position_m[law.robot][rows], run.position_m[law.other][rows]
@@ -290,7 +290,7 @@ def safe_hyp(run: Run) -> Found:
 
 
 def _lost_to_old_positions_m(run: Run, pair: Pair, period_s: float) -> float:
-    """What the steps of two UGVs miss in all of the law towards the last positions that each had of the other, m."""
+    """The sum of violations of the asynchronous law by two UGVs, m."""
     # A step that misses nothing ends where the other's disc cannot come until that one decides again, or leads away
     # from all of it, or is none. What is missed is missed for good. Pairs that stay far need no law.
     ends = np.append(run.sample_row, len(run.t_s) - 1)
@@ -316,7 +316,7 @@ def _lost_to_old_positions_m(run: Run, pair: Pair, period_s: float) -> float:
 
 
 def _missed_towards_old_m(apart: Array, step: Array, radius: Fraction, safe: Fraction) -> Fraction:
-    """What one step misses, m: of the way that it may go towards a disc, or of the cone that leads off it."""
+    """The violation by one step, m: of the distance to the disc, or of the cone away from it."""
     away, gone = ([Fraction(axis) for axis in vector.tolist()] for vector in (apart, step))
     inner = sum((a * b for a, b in zip(away, gone, strict=True)), Fraction())
     square = sum((a * a for a in away), Fraction())
@@ -352,7 +352,7 @@ def _constants(run: Run) -> None:
 
 
 def _first_m(run: Run, pair: Pair) -> float:
-    """The least distance of the bodies of a pair when both are first there, and under commands given before, m."""
+    """The least distance of a pair's bodies when both first exist, and under commands given before, m."""
     rows, bent = run.there(pair.other), run.bent_m(pair)
     many = int(np.searchsorted(run.t_s[rows], run.t_s[rows.start] + pair.start_s - SMALL)) + 1
     apart = run.apart(pair)[:many]
@@ -365,7 +365,7 @@ def _first_m(run: Run, pair: Pair) -> float:
 
 
 def _rolled_m(run: Run, robot: str) -> Array:
-    """How far a unicycle went ahead from row to row, m: below 0 if it drove backwards."""
+    """Forward motion of a unicycle from row to row, m; negative if it drove backwards."""
     way = run.ways[robot]
     assert way.heading_rad is not None
     middle = 0.5 * (way.heading_rad[1:] + way.heading_rad[:-1])
@@ -374,7 +374,7 @@ def _rolled_m(run: Run, robot: str) -> Array:
 
 
 def _chord_rad(run: Run, robot: str) -> Array:
-    """2 sin of half the turn from row to row: the chord of an arc over its radius."""
+    """2 sin(turn / 2) from row to row: the chord of an arc over its radius."""
     heading = run.ways[robot].heading_rad
     assert heading is not None
     return np.asarray(2.0 * np.abs(np.sin(0.5 * np.diff(heading))))
@@ -416,7 +416,7 @@ def _motion(run: Run) -> None:
 
 
 def _without_message(run: Run) -> None:
-    """A UGV that lacks the message of another one at a sample stands, unless it knows that the other one is far."""
+    """A UGV that misses another one's message at a sample stands, unless it knows that the other one is far."""
     if not run.links["loss"]:
         return
     period_s = float(run.scenario["control"]["period_s"])

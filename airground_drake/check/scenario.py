@@ -1,4 +1,4 @@
-"""What a resolved scenario declares: pairs and their safe distances, presets, the trigger and its threshold."""
+"""The content of a resolved scenario: pairs and safe distances, presets, the trigger and its threshold."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ class Pair(NamedTuple):
 
     @property
     def safe_m(self) -> float:
-        """Safe distance of the robot's centre from the parts of the other's shape, m."""
+        """Distance to keep between the robot's centre and the other's shape, m."""
         return self.gap_m + self.radii_m
 
     @property
     def in_the_law(self) -> Pair:
-        """This pair with the distance that the law keeps in place of d."""
+        """This pair with the law's distance in place of d."""
         return self._replace(gap_m=self.gap_m + self.more_m) if self.more_m else self
 
     def passive(self, period_s: float) -> Pair:
@@ -127,7 +127,7 @@ def moving_of(scenario: Json) -> list[str]:
 
 
 def places_of(scenario: Json, t_s: Array) -> dict[str, Array]:
-    """Where the origins of the shapes of barriers are at times (K,), (K, 3), m, by name; those at rest are at 0."""
+    """Origins of the shapes of barriers at times (K,), (K, 3), m, by name; 0 for static ones."""
     period_s = float(scenario["control"]["period_s"])
     return {
         name: way_m(body["moves"], period_s, t_s) if body["moves"] else np.zeros((len(t_s), 3))
@@ -136,7 +136,7 @@ def places_of(scenario: Json, t_s: Array) -> dict[str, Array]:
 
 
 def way_m(moves: Json, period_s: float, t_s: Array) -> Array:
-    """Places on the way of an obstacle that moves, (K, 3), m; every leg takes a whole number of control periods."""
+    """Positions of a moving obstacle, (K, 3), m; every leg takes a whole number of control periods."""
     there = np.array(moves["waypoints_m"], dtype=np.float64)
     back = {"stop": there[:0], "reverse": there[-2::-1], "loop": there[:1]}[moves["at_end"]]
     corners = np.concatenate([there, back])
@@ -152,7 +152,7 @@ def _whole(periods: Any) -> Any:
 
 
 def expected_m_s(body: Json) -> float:
-    """The speed at which an obstacle is expected to move at most, m/s."""
+    """The largest expected speed of an obstacle, m/s."""
     return float(body["max_speed_m_s"] or (body["moves"]["speed_m_s"] if body["moves"] else 0.0))
 
 
@@ -199,7 +199,7 @@ def links_of(scenario: Json) -> dict[str, float]:
 
 
 def _as_seen(pair: Pair, error_m: float) -> Pair:
-    """A pair whose law acts on measured positions: e + sqrt(m^2 + e^2), and a drift at the gain of the pair."""
+    """A pair under position errors: the distance e + sqrt(m^2 + e^2), plus drift over the pair's gain."""
     # Of two robots one may stand: the pair then meets the law with half the gain, and a drift costs twice as much.
     robots = 2 if pair.halved else 1
     error_m, drift_m = robots * error_m, robots * pair.drift_m
@@ -209,7 +209,7 @@ def _as_seen(pair: Pair, error_m: float) -> Pair:
 
 
 def _with_plants(pair: Pair, room: dict[str, Taken]) -> Pair:
-    """A pair with what the plants of its robots take."""
+    """A pair with the cost of its robots' plants."""
     own, other = room[pair.robot], room.get(pair.other)
     both = [plant for plant in (own, other) if plant]
     cover, drift = sum(plant.cover_m + plant.slip_m for plant in both), sum(plant.drift_m for plant in both)
@@ -262,5 +262,5 @@ def root_m(drift_m_s: float, noise_m_sqrt_s: float, ratio_s: float) -> float:
 
 
 def written(value: float) -> Fraction:
-    """A number as the decimal that it is written as: 0.1 is a tenth."""
+    """A float as the decimal that it prints as, exactly: 0.1 is 1/10."""
     return Fraction(repr(float(value)))

@@ -1,8 +1,8 @@
 """Shapes of obstacles: convex parts, their signed distances, and the least of these along straight motion.
 
 A part is the convex hull of corners in the plane, from one height to another. One corner of one height is a point: the
-centre of a ball, or a robot. Distances are from parts; radii are in the distance to be kept. Inside a part the distance
-is minus the depth. From several parts it is the least.
+centre of a ball, or a robot. Distances are from parts; radii are included in the distance to keep. Inside a part the
+distance is minus the depth. With several parts the least counts.
 
 The signed distance is a convex function of the place, and changes by no more than the place moves.
 """
@@ -77,7 +77,7 @@ class Part:
         return self.between_m(places[:-1], places[1:], (at_m[:-1], at_m[1:]), reach_m)
 
     def away(self, place: Sequence[Fraction]) -> list[Away]:
-        """Exactly, from the nearest point outside, and from the nearest faces inside; equally near ones all do."""
+        """Exact vectors away from the nearest point, or from inside, the nearest faces; all of them on a tie."""
         x, y, z = place
         height = Fraction()
         offsets = []
@@ -108,7 +108,7 @@ class Shape:
         self.high = np.array([[*part.begin.max(axis=0), part.top_m] for part in parts])  # the opposite corner
 
     def bounds_m(self, low: Array, high: Array) -> Array:
-        """Lower bounds of the distances of all in S boxes from each part, (S, m); -inf where they may meet."""
+        """Lower bounds of the distances between S boxes and each part, (S, m); -inf where they may meet."""
         # low: (S, 3), m
         gap = np.maximum(low[:, None] - self.high, self.low - high[:, None])
         apart = np.linalg.norm(np.maximum(gap, 0.0), axis=2) - ROUNDING_M
@@ -230,7 +230,7 @@ def edges_of(corners: Sequence[T]) -> list[tuple[T, T]]:
 
 
 def _turn(a: Corner, b: Corner, c: Corner) -> float:
-    """Above 0 if the way from a over b to c turns left."""
+    """Positive if the path a, b, c turns left."""
     return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 
 

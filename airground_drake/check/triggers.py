@@ -165,7 +165,7 @@ def _lags_s(run: Run, ugv: str, steps: list[Step]) -> list[float]:
 
 
 def _modes_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> None:
-    """The mode at a row is the automaton's just before or just after it."""
+    """The recorded mode is the automaton's just before or just after the row."""
     times = np.array([step.t_s for step in steps])
     modes = np.array([SUPERVISING, *(step.mode for step in steps)])
     before = modes[np.searchsorted(times, run.t_s - EVENT_S)]
@@ -175,7 +175,7 @@ def _modes_are_the_automatons(run: Run, ugv: str, steps: list[Step]) -> None:
 
 
 def _noise_moves_as_it_must(run: Run, ugv: str) -> None:
-    """(15) from 0: from row to row by Euler's method, with one sample for each period of the noise."""
+    """The noise obeys (15) from 0, by Euler's method, with one sample for each noise period."""
     decision = run.scenario["decision"]
     noise = run.column(f"{ugv}.noise_m")
     end = run.t_s[1:]
@@ -207,7 +207,7 @@ def zeno_trace(run: Run) -> Found:
 
 
 def thr_quality(run: Run) -> Found:
-    """THR-QUALITY: at triggers, and where none comes, the error without noise is within w of the threshold."""
+    """THR-QUALITY: at triggers, and in excursions without one, the noise-free error is within w of the threshold."""
     # w is the width of the hysteresis; half the threshold for the bare trigger.
     zeta, release = run.levels.zeta_m, run.levels.release_m
     tolerance = zeta - release if release < zeta else zeta / 2.0
@@ -225,7 +225,7 @@ def thr_quality(run: Run) -> Found:
 def _off_m(
     error: Variable, levels: Levels, tolerance: float, triggers: list[float], releases: list[float]
 ) -> Iterator[float]:
-    """How far the error was from the threshold: at each trigger, and in each excursion that is missed."""
+    """Distance of the error from the threshold at each trigger, and in each missed excursion."""
     begin_s, end_s = float(error.t_s[0]), float(error.t_s[-1])
     for trigger in [*triggers, None]:
         if trigger is None and begin_s >= end_s:  # the dwell outlasts the run
@@ -249,7 +249,7 @@ def _off_m(
 
 
 def _excursions(error: Variable, levels: Levels, begin_s: float, end_s: float) -> Iterator[tuple[float, float]]:
-    """When the error reaches the threshold or is there, and when it falls below the release level, at most the end."""
+    """Begin and end of each excursion: the error reaches the threshold, and falls below the release level."""
     at_s: float | None = begin_s
     while at_s is not None and at_s <= end_s:
         start = at_s if error.at(at_s) >= levels.zeta_m else error.reaches(levels.zeta_m, at_s, above=True)

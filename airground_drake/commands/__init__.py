@@ -20,7 +20,7 @@ from airground_drake.scenario.options import Parser
 
 
 class Command(NamedTuple):
-    """What `airground NAME ...` does."""
+    """A command `airground NAME ...`."""
 
     # The module has `main`, which takes the arguments and returns the exit code, and `parser`, which makes the parser
     # of the arguments. Slow imports are inside `main`. An error that `main` raises becomes one line, see `main` below.

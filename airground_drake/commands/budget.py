@@ -1,4 +1,4 @@
-"""`airground budget SCENARIO`: what the distances of a scenario cost, and what one imperfection changes."""
+"""`airground budget SCENARIO`: the distance budget of a scenario, and the effect of one imperfection."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
 
 
 def _costs(scenario: Scenario, key: str, value: object) -> dict[str, float]:
-    """By kind of pair, what is promised and kept by the pair to which most is added; nothing for a refused value."""
+    """By kind of pair, promise and law distance of the pair with the largest cost; empty for a refused value."""
     from airground_drake.scenario.budget import budget
     from airground_drake.scenario.load import validated
 
@@ -127,7 +127,7 @@ def _costs(scenario: Scenario, key: str, value: object) -> dict[str, float]:
 
 
 def _as_text(rows: DataFrame, key: str) -> str:
-    """A line for each value and run; below, what its columns mean, and the reasons of what was not judged."""
+    """A line for each value and run; then an explanation of the columns, and why runs were not judged."""
     judged = rows["ended"] == JUDGED
     shown = rows[[key, "run", "ended"]].copy()
     for law in rows.columns[rows.columns.str.endswith(LAW)]:

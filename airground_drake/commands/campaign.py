@@ -1,4 +1,4 @@
-"""`airground campaign SPEC -n 1000`: judge many draws of a scenario, and bound how likely a violation is."""
+"""`airground campaign SPEC -n 1000`: judge many draws of a scenario, and bound the probability of a violation."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def _proved_again(folder: Path, lines: Sequence[CheckLine]) -> Iterator[CheckLin
 
 
 def _compared(run: str, entry: Any, recorded: Any) -> CheckLine:
-    """Compare what Coq finds of a run with its entry in proofs.json, `recorded`; None if it has no entry."""
+    """Compare Coq's result for a run with its entry in proofs.json, `recorded`; None without one."""
     from airground_drake.report.compare import differences
 
     line = partial(CheckLine, "proofs", run, by="Coq")

@@ -114,7 +114,7 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
 
 
 def _try(search: Search, pool: Pool) -> None:
-    """Judge the first draw, to see that the claim says something about its runs."""
+    """Judge the first draw, to check that the claim applies to its runs."""
     from airground_drake.study.campaign.rows import JUDGED
     from airground_drake.study.campaign.work import rows_of
 
@@ -129,7 +129,7 @@ def _small(path: Path) -> Path:
 
 
 def _save(search: Search, best: Best, path: Path, tests: int) -> None:
-    """Write the scenario of the best point; beside it a small one, if it is a counterexample."""
+    """Write the scenario of the best point, and a minimised one if it is a counterexample."""
     from airground_drake.base.limits import MAX_NAME
     from airground_drake.scenario.document import text_of
     from airground_drake.scenario.load import resolved

@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _write(place: Path) -> Path:
-    """Write the page of a folder; FolderError if it has no reports, or an index.html that is not ours."""
+    """Write the page of a folder; FolderError without reports, or with an index.html of other origin."""
     from airground_drake.report.html import render_beside
 
     page = place / PAGE
@@ -70,7 +70,7 @@ def _entry(report: Path, place: Path, prefix: str) -> dict[str, Any]:
 
 
 def _headline(report: Report) -> list[Line]:
-    """The report in one or two lines; none if its evidence lacks something that only its first screen needs."""
+    """The report in one or two lines; empty if its evidence is incomplete."""
     from airground_drake.report import screen
 
     try:
@@ -80,7 +80,7 @@ def _headline(report: Report) -> list[Line]:
 
 
 def _thumbnail(folder: Path, report: Report, prefix: str) -> str:
-    """The last run as a picture; '' if it has no trace that can be used."""
+    """A picture of the last run; '' without a usable trace."""
     from airground_drake.report.view.plane import thumbnail_of
     from airground_drake.sim import trace
 

@@ -1,4 +1,4 @@
-"""`airground init FILE`: write a scenario to start from: a small one, a copy of a shipped one, or one of a fleet."""
+"""`airground init FILE`: write a scenario to start from: a small one, a copy of a shipped one, or a fleet."""
 
 import re
 from collections.abc import Sequence

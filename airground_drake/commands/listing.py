@@ -1,4 +1,4 @@
-"""`airground list [KIND [NAME]]`: every name that a scenario or the command line can use, or all about one of them."""
+"""`airground list [KIND [NAME]]`: names that a scenario or the command line can use, or details of one."""
 
 import inspect
 import textwrap
@@ -60,7 +60,7 @@ def _print_one(kind: str, name: str) -> int:
 
 
 def _about(kind: type, name: str) -> list[str]:
-    """Paragraphs about a class: what it says of itself, its parameters, or what a claim states."""
+    """Paragraphs about a class: its docstring and parameters, or a claim's statement."""
     if statement := getattr(kind, "statement", ""):
         claim: Any = kind
         return [
@@ -73,7 +73,7 @@ def _about(kind: type, name: str) -> list[str]:
 
 
 def _print_keys(beginning: str) -> int:
-    """Print the keys of a scenario whose dotted key, without names, begins so."""
+    """Print the keys of a scenario below a dotted key."""
     from airground_drake.scenario.json_schema import scenario_schema
     from airground_drake.scenario.keys import sections
 

@@ -1,4 +1,4 @@
-"""`airground replay DIR [RUN]`: show what happened in the runs of a report, from their saved traces."""
+"""`airground replay DIR [RUN]`: replay the runs of a report from their saved traces."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _paths(output: Path, runs: Sequence[str]) -> dict[str, Path]:
-    """Map each run to the file of its page: `output` itself if it is the name of a page, else a file below it."""
+    """The file of each run's page: `output` itself if it names a page, otherwise a file below it."""
     if output.suffix != ".html":
         return {name: output / f"replay_{name}.html" for name in runs}
     if len(runs) > 1:

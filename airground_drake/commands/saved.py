@@ -1,4 +1,4 @@
-"""What `replay`, `export` and `figures` share: a report, its runs, and a place outside of it."""
+"""Code shared by `replay`, `export` and `figures`: a report, its runs, and an output outside of it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def runs_of(folder: Path, run: str | None = None) -> Sequence[str]:
 
 
 def outside_reports(folder: Path, what: str) -> None:
-    """Create a folder for `what`. Reports are left as they are: the checker refuses files that are not theirs."""
+    """Create a folder for `what`, outside of reports, in which the checker refuses foreign files."""
     for above in (folder.resolve(), *folder.resolve().parents):
         if is_report(above):
             raise FolderError(f"{folder} is in the report {above}, which is complete; name another, with -o")

@@ -27,7 +27,7 @@ PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "ma
 
 
 def with_seeds(scenario: Scenario, own: Mapping[str, Trace], number: int, progress: Progress) -> list[dict[str, Any]]:
-    """The outcome of every run with each of the seeds 1 to `number`, by run, then by seed; see `metrics.outcome`."""
+    """Outcomes of all runs with the seeds 1 to `number`, by run, then by seed; see `metrics.outcome`."""
     others = [seed for seed in range(1, number + 1) if seed != scenario.seed]
     outcomes = [metrics.outcome(trace) for trace in simulate_seeds(scenario, others, progress=progress)]
     outcomes += [metrics.outcome(trace) for trace in own.values() if 1 <= scenario.seed <= number]
@@ -92,7 +92,7 @@ def _map_files(cells: MapCells, output: Path) -> list[str]:
 
 
 def provenance(scenario: Scenario, started: datetime, command: str) -> dict[str, Any]:
-    """Where the report comes from: versions, machine, commit, seed, begin, command."""
+    """The provenance of the report: versions, machine, commit, seed, begin, command."""
     packages = versions()
     return {
         "package": packages.pop("airground_drake"),

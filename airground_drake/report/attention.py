@@ -1,4 +1,4 @@
-"""What needs attention in a report, each in one line."""
+"""The items of a report that need attention, each in one line."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ ROLES = ("first", "second", "robot", "other")  # keys that hold the name of a bo
 
 
 class Item(NamedTuple):
-    """One thing that needs attention."""
+    """An item that needs attention."""
 
     chip: str  # the status to show
     words: str  # what happened, in one line
@@ -28,7 +28,7 @@ class Item(NamedTuple):
 
 
 def items(report: Report) -> list[Item]:
-    """All of a report: what may explain the rest first, then refuted claims, then undecided and missing ones."""
+    """All items: first possible explanations of the rest, then refuted claims, then undecided and missing ones."""
     unexpected = [claim for claim in report.claims if claim.as_expected is False]
     unexpected.sort(key=lambda claim: claim.status in UNDECIDED)
     return [
@@ -62,7 +62,7 @@ def _of_claim(claim: Claim, run: Run | None) -> Item:
 
 
 def _refused(run: Run, robot: str) -> str:
-    """How often and why a robot that did not get where it must refused proposals."""
+    """The refusals, with reasons, of a robot that did not end where it must."""
     reasons = run.metrics.gatekeeper.refusals.get(robot, {}) if run.metrics.gatekeeper else {}
     if not reasons:
         return ""
@@ -72,7 +72,7 @@ def _refused(run: Run, robot: str) -> str:
 
 
 def beforehand(report: Report) -> Iterator[Item]:
-    """Shown first, also on the terminal: faults of policies and solvers, no way found, and runs that end too early."""
+    """Items shown first, also on the terminal: faults of policies, failed searches, and runs that end too early."""
     yield from _of_faults(report.runs)
     for name, run in report.runs.items():
         why = run.metrics.no_way_reasons
@@ -90,7 +90,7 @@ def beforehand(report: Report) -> Iterator[Item]:
 
 
 def failures(faults: Mapping[str, Sequence[Mapping[str, Any]]]) -> Iterator[str]:
-    """For the terminal, from the faults of each run: how often each policy failed, and its first traceback, once."""
+    """Lines for the terminal: how often each policy failed, and its first traceback, once."""
     seen = set[str]()
     for run, those in faults.items():
         for policy, alike in grouped((str(fault["policy"]), fault) for fault in those).items():
@@ -116,7 +116,7 @@ def _of_faults(runs: Mapping[str, Run]) -> Iterator[Item]:
 
 
 def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The faults of a run, equal ones once: policy, what it said (cut), how often, robots, first and last time."""
+    """The faults of a run, grouped: policy, truncated message, count, robots, first and last time."""
     kinds = grouped(((str(fault["policy"]), str(fault["what"])), fault) for fault in faults)
     return [
         {
@@ -132,7 +132,7 @@ def faults_together(faults: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
 
 
 def place_of(claim: Claim) -> dict[str, Any]:
-    """Where the margin of a claim is, and its counterexample."""
+    """The place of a claim's margin, and its counterexample."""
     return {**claim.where, **(claim.counterexample or {})}
 
 
@@ -145,13 +145,13 @@ def bodies_of(claim: Claim) -> list[str]:
 
 
 def in_words(claim: Claim) -> str:
-    """What came of a claim, as far as it is known: who, how far from what was allowed, when."""
+    """The result of a claim in words, as far as known: bodies, excess over the allowed value, time."""
     place, who = place_of(claim), " and ".join(bodies_of(claim))
     known = {name: value for name, value in place.items() if isinstance(value, float | int)}
     at = f", {known['t_s']:.3f} s" if "t_s" in known else ""
     if claim.status in PASSING:
         idle = claim.exercised == 0
-        return f"nothing put it to the test: no {claim.exercised_by}" if idle else f"{claim.status} all the same"
+        return f"not tested: no {claim.exercised_by}" if idle else f"{claim.status} all the same"
     if claim.status != "refuted":
         why = claim.evidence.get("reason") or claim.evidence.get("error")
         return why if isinstance(why, str) else "could not be decided"

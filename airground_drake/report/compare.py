@@ -1,4 +1,4 @@
-"""What has changed from one report to another, read from their report.json alone.
+"""The changes between two reports, read from their report.json alone.
 
 A verdict is worse if it stands further down in `ORDER` than before, if it was as expected and no longer is, or if it
 is gone. A row of the reproduction table is worse by `ROWS`, and a finding about the paper if it is no longer
@@ -80,7 +80,7 @@ def _is_number(value: Any) -> bool:
 
 
 def rounded(changes_of: Mapping[str, Any], part: str) -> list[Change]:
-    """The changes of a part by no more than rounding; whatever changes in the inputs counts."""
+    """The changes within rounding of a part; changes of the inputs always count."""
     return [
         change for change in changes_of[part]
         if part != "inputs" and not change["worse"] and not any(differences(change["before"], change["after"]))
@@ -88,7 +88,7 @@ def rounded(changes_of: Mapping[str, Any], part: str) -> list[Change]:
 
 
 def _inputs(before: Report, after: Report) -> Iterator[Change]:
-    """Keys of the scenario, versions and third-party files that differ: what the reports were made from."""
+    """Differences of the inputs: keys of the scenario, versions and third-party files."""
     old, new = (
         {key: value for key, value in report.scenario.resolved.data().items() if key not in NO_INPUTS}
         | {f"version of {key}": value for key, value in report.provenance.items() if key in VERSIONS}
@@ -110,7 +110,7 @@ def _differing(was: Any, now: Any, key: str) -> Iterator[Change]:
 
 
 def _overall(before: Report, after: Report) -> Iterator[Change]:
-    """The verdict over all claims, which may change though no claim does: one may be missing."""
+    """Changes of the overall verdict, which may change without any claim, if one is missing."""
     was, now = before.overall.status, after.overall.status
     worse = _rank(OVERALL, now) > _rank(OVERALL, was)
     if was != now:

@@ -1,4 +1,4 @@
-"""report.json: everything that a report says, as strict JSON; HTML and JUnit only render it."""
+"""report.json: the content of a report as strict JSON, which HTML and JUnit render."""
 
 import subprocess
 from collections import Counter
@@ -71,7 +71,7 @@ def build(
 
 
 def sealed(document: Mapping[str, Any], folder: Path, names: Iterable[str]) -> dict[str, Any]:
-    """The document with the SHA-256 of every other file of the report under `files`: an exchanged file is noticed."""
+    """The document with the SHA-256 of every other file of the report under `files`."""
     return {**document, "files": {name: files.sha256((folder / name).read_bytes()) for name in sorted(names)}}
 
 
@@ -147,7 +147,7 @@ def expected_numbers(scenario: Scenario, runs: Mapping[str, Mapping[str, Any]]) 
 def missing(
     scenario: Scenario, traces: Mapping[str, Trace], claims: Sequence[Mapping[str, Any]], required: Iterable[str] = ()
 ) -> list[dict[str, str]]:
-    """Runs without a trace or any verdict; claims that are expected, required or added, but nobody checked."""
+    """Runs without a trace or verdict; claims that are expected, required or added, but were not checked."""
     checked = {(claim["run"], claim["id"]) for claim in claims}
     judged = {run for run, _ in checked}
     gaps = []

@@ -1,4 +1,4 @@
-"""What came of the runs of a report, from report.json alone. A fact here holds whatever the other facts are."""
+"""Independent facts about the runs of a report, from report.json alone."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ UNJUDGED = Claim(id="", run="", status="not_run", as_expected=None, exercised=No
 
 
 class Breach(NamedTuple):
-    """A pair that collided or came too near: the pair, when and how near, and whose doing it was, '' if not known."""
+    """A pair that collided or came too near: its names, when and how near, and the cause, '' if not known."""
 
     first: str
     second: str
@@ -27,7 +27,7 @@ class Breach(NamedTuple):
 
 
 class RunFacts:
-    """What came of a run that the scenario names, and that was run."""
+    """Facts about a run of the scenario."""
 
     def __init__(self, report: Report, name: str) -> None:
         self.name = name
@@ -63,7 +63,7 @@ class RunFacts:
 
     @property
     def is_proved(self) -> bool:
-        """Whether theorems keep the distances from bodies at rest and between robots, and their conditions held."""
+        """Whether theorems guarantee the distances from static bodies and between robots, and their conditions held."""
         robots = self._scenario.robots.values()
         links = self._scenario.ugv_links
         known = not (self._scenario.position_error_m or self._scenario.asynchronous or (links and links.loss))
@@ -74,7 +74,7 @@ class RunFacts:
 
     @cached_property
     def breaches(self) -> list[Breach]:
-        """Collisions by time, or else pairs that came too near, those of least margin first; the robots' own first."""
+        """Collisions by time, otherwise pairs that came too near, by margin; those caused by robots first."""
         # Empty where the claim alone says that a distance was not kept.
         events = {id(hit): hit for hit in self.hits.values()}.values()
         breaches = [
@@ -92,7 +92,7 @@ class RunFacts:
 
     @property
     def others_too_close(self) -> int:
-        """How many pairs came too near besides those that collided, before one of them collided."""
+        """Number of pairs that came too near without colliding, before one of them collided."""
         if not self.hits:
             return max(0, len(self.breaches) - 1)
         among = {frozenset(breach[:2]) for breach in self.breaches}
@@ -105,20 +105,20 @@ class RunFacts:
 
     @property
     def whose(self) -> str:
-        """Whose doing the breaches were, in words; '' if that is not known of all of them."""
+        """The cause of the breaches, in words; '' if it is not known for all of them."""
         doings = [breach.doing for breach in self.breaches]
         ours = [doing for doing in doings if doing in rules.OURS]
         if not doings or "" in doings:
             return ""
         if not ours:
-            return "" if self.claim(rules.OWN_DOING).status == "refuted" else "not the robots' doing"
+            return "" if self.claim(rules.OWN_DOING).status == "refuted" else "not caused by the robots"
         if len(ours) < len(doings):
-            return f"{len(ours)} of {len(doings)} the robots' doing"
-        return "the robots' doing" + (", by commands already under way" if {*ours} == {"under way"} else "")
+            return f"{len(ours)} of {len(doings)} caused by the robots"
+        return "caused by earlier commands of the robots" if {*ours} == {"under way"} else "caused by the robots"
 
     @property
     def contradicts_its_proof(self) -> bool:
-        """Whether a distance was broken that a theorem keeps, though the theorem's conditions held."""
+        """Whether a distance was broken although a theorem guarantees it and its conditions held."""
         # Beside what moves, a robot only keeps from bringing itself too near by commands that were not under way.
         kept = [breach for breach in self.breaches if breach.second not in self.movers or breach.doing == "robot"]
         return self.is_proved and (bool(kept) or not self.breaches)
@@ -130,20 +130,20 @@ class RunFacts:
 
     @property
     def unmapped(self) -> list[str]:
-        """Obstacles that a robot met which obeys the UAV, and that are not on the UAV's map."""
+        """Obstacles missing from the UAV's map that a robot came too close to while obeying the UAV."""
         off_the_map = {name for name, obstacle in self._scenario.obstacles.items() if not obstacle.known_to_uav}
         met = dict.fromkeys(breach.second for breach in self.breaches if self._obeys)
         return [name for name in met if name in off_the_map]
 
     def approaches(self) -> list[Approach]:
-        """The nearest approach after the start, and that of a mover if it is another one; else the least distance."""
+        """The nearest approach after the start, and that of a moving obstacle; otherwise the least distance."""
         return self._metrics.came_near or self.near[:1]
 
     # Arrived?
 
     @cached_property
     def home(self) -> set[str]:
-        """Robots that ended at their targets, or were there before they collided."""
+        """Robots that ended at their targets, or arrived before they collided."""
         ends, within = self._metrics.final_position_m, self._scenario.arrival_tolerance_m
         arrived = {name for name, robot in self._scenario.robots.items() if dist(ends[name], robot.target_m) <= within}
         before = {robot for robot, hit in self.hits.items() if self.arrived_s.get(robot, hit["t_s"]) < hit["t_s"]}
@@ -164,7 +164,7 @@ class RunFacts:
         return len(self.home & {*self.ugvs})
 
     def way(self, robot: str) -> OnTheWay:
-        """How far a UGV had come that neither arrived nor collided."""
+        """The progress of a UGV that neither arrived nor collided."""
         return self._metrics.on_the_way.get(robot, OnTheWay())
 
     def holders(self, robot: str) -> list[str]:
@@ -179,7 +179,7 @@ class RunFacts:
         return {fate for who, fate in self._fates() if who == robot} == {"refused"}
 
     def ending(self, robot: str) -> str:
-        """How a UGV ended that did not arrive: its state and, if known, the cause."""
+        """The end of a UGV that did not arrive: its state and, if known, the cause."""
         if hit := self.hits.get(robot):
             bodies = (hit["robot"], hit.get("other") or named(hit["obstacle"], hit.get("at_m")))
             return f"collided with {next(body for body in bodies if body != robot)}"
@@ -193,7 +193,7 @@ class RunFacts:
     # UAV proposals
 
     def _fates(self) -> Iterator[tuple[str, str]]:
-        """The UGV of each proposal, and the class of what became of it."""
+        """The UGV of each proposal, and the class of its outcome."""
         for sent in self._metrics.interventions:
             accepted = sent.accepted_s is not None
             fate = rules.CLASSES.get((accepted, sent.ended.how), rules.OPEN[accepted])

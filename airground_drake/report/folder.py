@@ -1,6 +1,6 @@
-"""The folder of a report: whether one may be written there, asked before the work, and removing an old one.
+"""The folder of a report: a check before the work that it may be written, and removal of an old report.
 
-A file belongs to a report by its path. No other file is removed, and none may be there unless a report is there, too.
+Files of a report are recognised by their paths. Other files are never removed, and are only allowed beside a report.
 """
 
 import fcntl
@@ -86,7 +86,7 @@ def is_report(folder: Path) -> bool:
 
 
 def _refused(folder: Path) -> str:
-    """What in the folder keeps a report from being written there; '' if nothing does."""
+    """Why no report can be written to the folder; '' if one can."""
     ours = is_report(folder)
     for path in _within(folder):
         name = path.relative_to(folder).as_posix()

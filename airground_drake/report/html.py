@@ -142,7 +142,7 @@ def environment() -> Environment:
 
 
 def _shown(claim: Claim) -> str:
-    """What is shown of a claim, a key of `CHIPS`: its outcome, or the kind of its evidence."""
+    """The chip of a claim, a key of `CHIPS`: its outcome, or the kind of its evidence."""
     kind = claim.evidence.get("kind")
     return kind if kind in KINDS and claim.status in PASSING else outcome(claim.status, claim.exercised)
 
@@ -163,7 +163,7 @@ def _template(name: str) -> str:
 
 
 def security_policy(style: str, script: str = "") -> str:
-    """A page's content security policy: nothing but this style sheet and this script, from nowhere else."""
+    """A page's content security policy, which admits only this style sheet and this script."""
     return (
         f"default-src 'none'; style-src {digest(style)}; script-src {digest(script) if script else NOTHING}; "
         "base-uri 'none'; form-action 'none'"
@@ -184,7 +184,7 @@ def evidence_tables(claim: Claim) -> list[Table]:
 
 
 def as_yaml(x: Any) -> str:
-    """A scenario for reading, cut if it is long; everything but ASCII is escaped, so that nothing turns the text."""
+    """A scenario as YAML, truncated; non-ASCII is escaped, so that nothing changes the writing direction."""
     text: str = yaml.safe_dump(x, default_flow_style=None, sort_keys=False, width=LINE_CHARS)
     cut = "\n… cut here; report.json has all of it" if len(text) > MAX_SCENARIO_CHARS else ""
     return text[:MAX_SCENARIO_CHARS] + cut
@@ -218,7 +218,7 @@ def _by_claim(claims: Sequence[Claim]) -> list[dict[str, Any]]:
 
 
 def _together(members: Sequence[Claim]) -> list[tuple[Claim, str]]:
-    """Verdicts of a claim that are shown alike, each with its runs; "all 3" if three runs have the same."""
+    """Equal verdicts of a claim with their runs; "all 3" if three runs have the same."""
     runs = sum(bool(claim.run) for claim in members)
     alike = grouped(((_shown(claim), claim.as_expected or claim.expected), claim) for claim in members)
     names = [(those[0], [claim.run for claim in those if claim.run]) for those in alike.values()]

@@ -1,4 +1,4 @@
-"""What the help of the UAV came to in a run: interventions, messages, avoidance meanwhile; strict JSON."""
+"""The UAV's interventions in a run, messages, and avoidance during interventions; strict JSON."""
 
 import math
 from typing import Any
@@ -20,7 +20,7 @@ BINDING_M_S = 1e-9  # an avoidance inequality binds where a command has less to 
 
 
 def interventions(trace: Trace) -> list[dict[str, Any]]:
-    """Every proposal of a run, by time, and what became of it; [] if they are malformed, which claims report."""
+    """Every proposal of a run, by time, with its outcome; [] if malformed, which claims report."""
     try:
         sent = proposals_of(trace)
     except (LookupError, TraceError, TypeError, ValueError):
@@ -31,7 +31,7 @@ def interventions(trace: Trace) -> list[dict[str, Any]]:
 
 
 def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) -> dict[str, Any]:
-    """What became of a proposal, from what its UGV executed (S,), and the decisions about it, if there are any."""
+    """The outcome of a proposal, from the proposals that its UGV executed (S,), and from decisions about it."""
     times = trace.sampled("t_s")
     during = np.flatnonzero(numbers == sent.number)
     begun_s = float(times[during[0]]) if during.size else None
@@ -58,7 +58,7 @@ def _end(how: str, t_s: float, reason: str = "") -> dict[str, Any]:
 
 
 def _unexecuted(trace: Trace, sent: ProposalRecord, answers: Any) -> dict[str, Any]:
-    """How a proposal ended that was never executed."""
+    """The end of a proposal that was never executed."""
     refused = None if answers is None else answers[answers["decision"] == "refuse"]
     if refused is not None and len(refused):
         return _end("refused", float(refused["t_s"].iloc[0]), str(refused["reason"].iloc[0]))
@@ -72,7 +72,7 @@ def _unexecuted(trace: Trace, sent: ProposalRecord, answers: Any) -> dict[str, A
 
 
 def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float | None) -> dict[str, Any]:
-    """How a proposal ended that was executed up to a time, s; None: to the end of the run."""
+    """The end of a proposal executed up to a time, s; None: to the end of the run."""
     if ended_s is None:
         return _end("end of the run", float(trace.t[-1]))
     if answers is not None:
@@ -91,7 +91,7 @@ def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float |
 
 
 def messages(trace: Trace) -> dict[str, Any] | None:
-    """How many messages a run took, and how many an always-on scheme takes; None without a UAV that intervenes."""
+    """Number of messages of a run, and of an always-on scheme; None without interventions."""
     method = method_of(trace.meta["method"])
     scenario = trace.scenario
     ugvs = trace.ugvs

@@ -12,7 +12,7 @@ _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def render(report: Report) -> str:
-    # A claim whose status is the expected one passes; it is skipped, with the reason, if nothing put it to the test.
+    # A claim whose status is the expected one passes; it is skipped, with the reason, if not tested.
     # Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and a claim that
     # nobody checked are errors.
     name, missing = report.scenario.name, report.overall.missing

@@ -1,4 +1,4 @@
-"""What a program that makes a report again found: lines of JSON, which `airground check` shows."""
+"""Output of programs that recompute a report: lines of JSON, which `airground check` shows."""
 
 import json
 import os

@@ -31,7 +31,7 @@ Audit: TypeAlias = "Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]],
 
 
 class Wanted(NamedTuple):
-    """What a report should have, and what it may cost."""
+    """The requested parts of a report, and limits of its cost."""
 
     formats: tuple[str, ...] = tuple(folder.PAGES)  # of html, json and junit; traces and diagram are always written
     command: str = ""  # how to make this report again

@@ -1,4 +1,4 @@
-"""Numbers of one run that every reader asks for: distances, events, decisions, times; strict JSON."""
+"""Metrics of one run: distances, events, decisions, times; strict JSON."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -76,7 +76,7 @@ def of_run(trace: Trace) -> dict[str, Any]:
 
 
 def came_near(trace: Trace) -> list[dict[str, Any]]:
-    """The pair of least margin among those that came nearer than they were when both were first there."""
+    """The pair of least margin among those that came nearer than when both first existed."""
     # Two entries at most: of all pairs; and of those of an obstacle that may move, if that is another pair.
     pairs = pairs_of(trace)
     bounds = apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
@@ -100,7 +100,7 @@ APPROACH_M = 1e-3  # a pair comes nearer if its gap shrinks by more than this, m
 
 
 def _approach(trace: Trace, pair: Pair) -> Gap | None:
-    """Where a pair was nearest after it had been farther apart; None if it never came nearer."""
+    """The nearest approach of a pair after it had been farther apart; None if it never came nearer."""
     # Where the gap is smallest when both are first there, a later approach is taken at the rows.
     least, gaps = least_gap(trace, pair), gap_over_time(trace, pair)[pair.rows]
     if least.t_s > trace.t[pair.row] and least.gap_m < gaps[0] - APPROACH_M:
@@ -118,7 +118,7 @@ CREEPING = 0.1
 
 
 def on_the_way(trace: Trace) -> dict[str, dict[str, Any]]:
-    """UGVs that neither arrived nor collided, and how far they had come when the run ended."""
+    """UGVs that neither arrived nor collided, with their progress at the end of the run."""
     done = {event["robot"] for event in trace.events if event["kind"] == "arrival"} | {*first_collisions(trace.events)}
     return {ugv: _on_the_way(trace, ugv) for ugv in trace.ugvs if ugv not in done}
 
@@ -149,7 +149,7 @@ def _is_at_map(trace: Trace, ugv: str) -> bool:
 
 
 def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
-    """The obstacle that moves and at the end keeps a UGV away from its target; {} without one."""
+    """The moving obstacle that keeps a UGV away from its target at the end; {} without one."""
     own = trace.scenario.ugvs[ugv]
     for pair in passive_pairs(trace):
         if pair.first == ugv and pair.last == len(trace.t) - 1:
@@ -167,7 +167,7 @@ def _kept_away(trace: Trace, ugv: str) -> dict[str, Any]:
 
 
 def _way_left_m(trace: Trace, ugv: str, time_s: float) -> float:
-    """Way of a UGV to its target, m: to the nearest point of its preset that is past by then, and along the preset."""
+    """Remaining way of a UGV, m: to the nearest point of its past preset, and along the preset."""
     own = trace.scenario.ugvs[ugv]
     corners = np.array(own.preset.waypoints_m)
     place = interpolate(trace.t, trace.position(ugv), time_s)

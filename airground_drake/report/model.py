@@ -1,4 +1,4 @@
-"""report.json as types: what `document` writes, and all that pages, lists and comparisons read."""
+"""The types of report.json, for its writer (`document`) and all readers."""
 
 # No `from __future__ import annotations` here: pydantic needs the types themselves, not their names.
 import json
@@ -99,7 +99,7 @@ class Approach(Distance):
 
 
 class Seed(Approach):
-    """What came of a run with a seed: the pair of least margin, whether all kept their distances, and all arrived."""
+    """The outcome of a run with a seed: the pair of least margin, whether distances were kept, and all arrived."""
 
     run: str
     seed: Whole
@@ -109,7 +109,7 @@ class Seed(Approach):
 
 
 class OnTheWay(Entry):
-    """How far a UGV had come that neither arrived nor collided when the run ended."""
+    """The progress of a UGV that had neither arrived nor collided at the end of the run."""
 
     stands: YesNo = False  # it did not move in the last second
     creeps: YesNo = False  # it hardly did
@@ -136,7 +136,7 @@ class Ending(Entry):
 
 
 class Intervention(Entry):
-    """A proposal, and what became of it."""
+    """A proposal and its outcome."""
 
     robot: str
     cause: str = ""  # the UGV whose trigger it was sent for
@@ -204,7 +204,7 @@ class Run(Entry):
 
     @property
     def no_way(self) -> list[str]:
-        """UGVs that the UAV was called for and found no way for, ever or at the end, though no policy failed."""
+        """UGVs for which the UAV found no path, ever or at the end, although no policy failed."""
         failed = {fault["robot"] for fault in self.faults}
         lost = dict.fromkeys([*self.metrics.without_proposals, *self.metrics.lost_at_the_end])
         return [ugv for ugv in lost if ugv not in failed]

@@ -1,6 +1,6 @@
-"""The rules of a report's first screen, as tables: what is asked of the claims, and the words of each cell.
+"""The rules of a report's first screen, as tables: conditions on claims, and the words of each cell.
 
-No other file of a report names a claim. A cell takes the first row of its table that applies.
+Claims are named only here. A cell uses the first row of its table that applies.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ CHOICE, LEAST_RISK, DECISIONS = "THR-CHOICE", "THR-OPT", "THR-DDM"
 PLANS, FOLLOWED = "GATE-PLAN", "LIVE-HYP"  # claims about the gatekeeper's plans, and about following the UAV
 # Where the chart of a claim stands, if that is in a report: a section, or a finding about the paper.
 CHARTS = {CHOICE: "intervened", REFINEMENT: "audit-9"}
-# What captions of exported figures say is established, by figure.
+# Claims in the captions of exported figures, by figure.
 CAPTIONS = {
     "trajectories": (ARRIVAL,),
     "distances": (DISTANCES, "SAFE-GATE"),
@@ -52,7 +52,7 @@ SAFE = (
     Rule(lambda run: run.is_broken, "no", "too close", kept=False),
     Rule(lambda run: run.claim(DISTANCES).status not in PASSING, "open", "not known", kept=False),
     Rule(lambda run: run.claim(DISTANCES).exercised == 0, "none", "nothing came near: untested"),
-    Rule(lambda run: run.is_proved and run.movers, "yes", "distances kept, proved but for what moves"),
+    Rule(lambda run: run.is_proved and run.movers, "yes", "distances kept, proved except for moving obstacles"),
     Rule(lambda run: run.is_proved, "yes", "distances kept, proved"),
     Rule(lambda run: True, "yes", "distances kept, not proved"),
 )

@@ -1,4 +1,4 @@
-"""The first screen of a report, cell by cell: one form for every scenario, for the page and the terminal.
+"""The first screen of a report, for the page and the terminal, in the same form for every scenario.
 
 Each cell is a mark and short lines; each line is one fact and needs no other line. The tables are in `rules`.
 """
@@ -23,14 +23,14 @@ MOST_ENDINGS, MOST_NAMES, MOST_WARNINGS = 4, 2, 3
 
 
 class Cell(NamedTuple):
-    """A mark, a key of `sentences.MARKS`, '' for none; and lines."""
+    """Lines with a mark, a key of `sentences.MARKS`, or ''."""
 
     mark: str
     lines: list[str]
 
 
 class Check(NamedTuple):
-    """An answer to a question about all runs, and the section of the page that has more."""
+    """An answer to a question about all runs, and the section of the page with details."""
 
     question: str
     mark: str
@@ -40,7 +40,7 @@ class Check(NamedTuple):
 
 @dataclass
 class Row:
-    """A run, and what came of it."""
+    """A row of the table of runs."""
 
     run: str  # its name
     says: str  # what it is, in words
@@ -56,7 +56,7 @@ class Row:
 
     @property
     def rank(self) -> tuple[int, bool, int, int]:
-        """The best first: kept, not known, too close, collided; not the robots' doing first; then who arrived."""
+        """Sort key, best first: kept, not known, too close, collided; then by cause, seeds and arrivals."""
         facts = self.facts
         order = 0 if self.kept else 3 if facts and facts.collided else 2 if facts and facts.is_broken else 1
         alien = facts is not None and facts.whose.startswith("not")
@@ -78,7 +78,7 @@ class Row:
 
 
 class FirstScreen(NamedTuple):
-    """What the first screen shows."""
+    """The content of the first screen."""
 
     headline: list[Line]  # one or two lines with the marks of their own runs
     rows: list[Row]  # a row per run
@@ -129,7 +129,7 @@ def _rows(report: Report) -> list[Row]:
 
 
 def _says(spec: Run) -> str:
-    """What a run is: its method, or the method's identifier and what the run sets differently."""
+    """The description of a run: its method, or the method's identifier and the run's own settings."""
     says = [rules.SETTINGS.get((key, str(value)), f"{key.split('.')[-1]} {value}") for key, value in spec.set.items()]
     if spec.composition != "augmented":
         says.append(rules.PRINTED)
@@ -141,7 +141,7 @@ def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
     faster = [f"{mover} was faster than declared" for mover in run.faster]
     if rule.kept:
         near = [near_body.line for near_body in run.approaches() if not near_body.is_short]
-        return Cell(rule.mark, [rule.words, *(near[:MOST_NAMES] or ["nobody else is there"]), *faster])
+        return Cell(rule.mark, [rule.words, *(near[:MOST_NAMES] or ["no other body"]), *faster])
     if rule.mark == "open":
         return Cell(
             rule.mark, [rule.words, f"the check: {(judged.status if judged.id else 'not made').replace('_', ' ')}"]
@@ -162,7 +162,7 @@ def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
 
 
 def _what(run: RunFacts) -> str:
-    """How a run was not safe, in a few words for the headline."""
+    """Why a run was not safe, in a few words for the headline."""
     few, many = ("collide", "collisions") if run.collided else ("too close", "pairs too close")
     if not (run.collided or run.is_broken):
         return "safety not known"
@@ -252,7 +252,7 @@ def _zeno(report: Report) -> Iterator[Check]:
         if bad := [claim.run for claim in traces if claim.status == "refuted"]:
             says, mark = f"two triggers too close in {', '.join(bad)}", "no"
         if gaps:
-            says += f"; {min(gaps):.3g} s seen"
+            says += f"; least gap {min(gaps):.3g} s"
         elif _verdict(traces) == "yes":
             says += "; no robot triggered twice"
         yield Check("Zeno-free?", mark, f"{', '.join(names)}: {says}" if len(told) > 1 else says, "claims")
@@ -261,7 +261,7 @@ def _zeno(report: Report) -> Iterator[Check]:
 
 
 def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
-    """A line for each threshold: what came of the triggers of its runs. Its choice has a section of its own."""
+    """A line for each threshold about the triggers of its runs; its choice has a section of its own."""
     scenario = report.scenario.resolved
     ours = scenario.decision.threshold.rule
     of = grouped(
@@ -285,10 +285,10 @@ def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
             says.append(f"at most {max(off_s, default=0.0):.2f} s off")
         above = list(dict.fromkeys(ugv for run in runs for ugv in run.run.metrics.above_at_start))
         if above:
-            says.append(f"{some(above, MOST_NAMES)} above it from the start")
+            says.append(f"{some(above, MOST_NAMES)} above the threshold from the start")
         wrong = [run.name for run, claim in zip(runs, exact, strict=True) if claim.status == "refuted"]
         if wrong:
-            says.append(f"{', '.join(wrong)}: not when the decision variable says")
+            says.append(f"{', '.join(wrong)}: triggers not at the crossings")
         if mark == "open":
             says.append("not known whether all are in time")
         yield Check("Threshold correct?", mark, ", ".join(says), "intervened")
@@ -318,17 +318,17 @@ def _beware(report: Report, rows: Sequence[Row]) -> list[str]:
     seen = [row.run for row, run in ran if row.plain and row.kept and not run.is_proved]
     helped = [run for _, run in ran if run.is_helped]
     warnings = {
-        "what is not known is fine: it was not checked": any(row.safe.mark == "open" for row in rows),
+        "unknown results are good: they were not checked": any(row.safe.mark == "open" for row in rows),
         "the UAV helps: it was never called": bool(helped) and not any(run.triggers for run in helped),
-        f"robots can keep away from {some(movers, MOST_NAMES)}: what moves comes as near as it likes": bool(movers),
-        f"distances are kept elsewhere, too ({', '.join(seen)}): this is not proved": bool(seen),
+        f"robots can keep away from {some(movers, MOST_NAMES)}: obstacles may move arbitrarily close": bool(movers),
+        f"distances are kept in other runs of {', '.join(seen)}: this is not proved": bool(seen),
     }
     told = [says for says, applies in warnings.items() if applies]
     return [*told[: MOST_WARNINGS - 1], _real(report)]
 
 
 def _real(report: Report) -> str:
-    """That real robots and other starts may differ; with what a user's plant showed of what it declares."""
+    """Other starts and real robots may differ; with the measured drift and cover of a user's plant."""
     own = [plant for claim in report.about(rules.CONDITIONS) for plant in claim.evidence.get("own_plants", ())]
     if not own:
         given = report.scenario.resolved
@@ -337,21 +337,21 @@ def _real(report: Report) -> str:
         sensing = f"errors of positions are at most {error_m:g} m" if error_m else perfect
         if faults and (faults.position_error_m or faults.late):
             sensing = "positions are worse than declared"
-        return f"other starts or real robots end so, too: arrival is only seen, and {sensing} here"
+        return f"robots arrive from other starts or in reality: arrival is only observed, and {sensing} here"
     most = max(own, key=lambda plant: float(plant["cover_m"]))
     return (
-        "other starts or real robots end so, too: {robot} showed {drift_m_s:.2g} of {declared_drift_m_s:.3g} m/s drift "
-        "and {cover_m:.3g} of {declared_cover_m:.3g} m cover here"
+        "robots arrive from other starts or in reality: {robot} showed {drift_m_s:.2g} of {declared_drift_m_s:.3g} m/s "
+        "drift and {cover_m:.3g} of {declared_cover_m:.3g} m cover here"
     ).format_map(most)
 
 
 def declared(report: Report) -> Cell:
-    """Whether the verdicts are those that the scenario declares: a statement about the scenario, not about safety."""
+    """Whether the verdicts are as the scenario declares, which says nothing about safety."""
     overall = report.overall
     refuted = sum(claim.status == "refuted" and claim.as_expected is True for claim in report.claims)
-    told = [f"{overall.as_expected} of {counted(overall.checks, 'check')} came out as the scenario declares"]
+    told = [f"{overall.as_expected} of {counted(overall.checks, 'check')} are as the scenario declares"]
     if refuted:
-        told[0] += f" (failures among them: {refuted})"
+        told[0] += f" ({counted(refuted, 'failure')} among them)"
     wrong = [*overall.differs, *overall.undecided, *overall.missing]
     subjects = {claim.id: claim.subject for claim in report.claims}
     names = [f"{claim.run or 'model'}: {subjects.get(claim.id) or claim.id or 'run'} "
@@ -390,7 +390,7 @@ def text(report: Report) -> str:
 
 
 def _table(rows: Sequence[Sequence[Cell]], widths: Sequence[int]) -> list[str]:
-    """Columns of these widths; cells are wrapped, and stand under the text of their first line, after the mark."""
+    """Rows of text with columns of these widths; wrapped lines are indented past the mark."""
     told = []
     for row in rows:
         cells = [_wrapped(cell, width) for cell, width in zip(row, widths, strict=True)]

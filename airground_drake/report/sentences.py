@@ -22,7 +22,7 @@ class Line(NamedTuple):
 
 
 class Mark(NamedTuple):
-    """How a mark is shown: its icon, its meaning for the legend and screen readers, and the class of its colour."""
+    """The appearance of a mark: its icon, its meaning for the legend and screen readers, and its colour class."""
 
     icon: str
     meaning: str
@@ -42,7 +42,7 @@ MAX_NAMES = 3  # maximum number of robots that a line names
 
 
 def unbroken(text: str) -> str:
-    """A line that is broken neither before a unit nor within a comparison: no-break spaces are there."""
+    """The line with no-break spaces before units and within comparisons."""
     return re.sub(r"(?<=\d) (?=[ms]\b|[≥<])|(?<=[≥<]) ", "\N{NO-BREAK SPACE}", text)
 
 

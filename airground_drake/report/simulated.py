@@ -1,8 +1,8 @@
-"""The runs of a report simulated again, with its other seeds, its third-party claims and its block diagram.
+"""Simulates the runs of a report again, with its other seeds, third-party claims and block diagram.
 
 `python -P -m airground_drake.report.simulated DIR LIMIT_S [--allow-plugins]` prints what it found as JSON lines, which
-`airground check --simulate` shows. A run can honestly differ on another processor: from the last digit of one number,
-chaos makes other events. So a difference is "not reproduced here", and proves nothing by itself.
+`airground check --simulate` shows. A correct run can differ on another processor, because chaos amplifies a difference
+in the last digit. So a difference is "not reproduced here", and proves nothing by itself.
 """
 
 import json
@@ -31,7 +31,7 @@ from airground_drake.verify import judge_all
 
 
 def lines(folder: Path, *, allow_plugins: bool = False, progress: Progress = SILENT) -> Iterator[Line]:
-    """Simulate every run of a report again: a line for each run, and for each other part that takes execution."""
+    """Simulate every run of a report again: a line for each run, and for each other part that needs execution."""
     # allow_plugins: whether third-party code that the report names may be imported and run.
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder))

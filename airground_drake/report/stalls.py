@@ -1,4 +1,4 @@
-"""Where UGVs stood in a run short of their targets, and which bodies held them."""
+"""Stalls: places at which UGVs stood short of their targets, and the bodies that held them."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ HELD_M_S = AT_REST_M / AT_REST_S
 
 
 def stalls(trace: Trace) -> list[dict[str, Any]]:
-    """Where UGVs stood for `AT_REST_S` or longer short of their targets, by time; before a UGV's first collision."""
+    """Stalls of `AT_REST_S` or longer, by time, before a UGV's first collision."""
     # Nobody holds a UGV that waits as its proposal asks.
     waits = list[dict[str, Any]]()
     for ugv in trace.ugvs:
@@ -63,7 +63,7 @@ def _stall(trace: Trace, ugv: str, first: int, last: int, given: Inequalities) -
 
 
 def _held_by(trace: Trace, ugv: str, sample: int, given: Inequalities) -> list[str]:
-    """The bodies whose avoidance inequalities stop a UGV at a sample: those that its wish pushes against."""
+    """The bodies whose avoidance inequalities block a UGV's desired velocity at a sample."""
     parts = parts_of(trace)
     binding = (given.sample == sample) & (given.slack(trace.chosen(ugv)) <= HELD_M_S)
     wish = _wish(trace, ugv, sample)
@@ -80,7 +80,7 @@ def _held_by(trace: Trace, ugv: str, sample: int, given: Inequalities) -> list[s
 
 
 def _wish(trace: Trace, ugv: str, sample: int) -> Array:
-    """Where a UGV would go without avoidance, (3,), m/s: its proposal's way if it executes one, else its own task."""
+    """The desired velocity of a UGV without avoidance, (3,), m/s: of its executed proposal, or of its own task."""
     place = trace.position(ugv)[trace.sample_rows[sample]]
     number = int(trace.sampled(f"{ugv}.executing")[sample])
     gain = trace.scenario.control.motion_gain_1_s

@@ -1,4 +1,4 @@
-"""How much work a scenario asks for, counted from its numbers before the work begins.
+"""An estimate of a scenario's work, computed from its numbers before the work begins.
 
 A run has n UGVs and the UAV, T seconds, control period h, and m obstacles and phantoms. A UGV keeps away from
 K = n + m points. The run asks for:
@@ -47,7 +47,7 @@ MOST_ROWS = 4_000_000
 
 
 class Limits(NamedTuple):
-    """What a scenario may ask for."""
+    """Limits of a scenario's work."""
 
     work: float = 1e7  # steps
     memory: float = 8.0 * GIB  # bytes
@@ -59,7 +59,7 @@ DEFAULT_LIMITS = Limits()
 
 
 class Estimate(NamedTuple):
-    """The work that all runs of a scenario ask for."""
+    """The work of all runs of a scenario."""
 
     rows: float  # rows of the traces' signals
     steps: float  # robots moved by one step
@@ -75,7 +75,7 @@ class Estimate(NamedTuple):
 
     @property
     def announcement(self) -> str:
-        """What will take long, in one line; '' if nothing will."""
+        """One line about long work; '' if none will be long."""
         seconds = STEP_S * self.searched
         if seconds < LONG_S:
             return ""

@@ -70,7 +70,7 @@ def _of_another_kind(source: str, key: str, kind: str, kinds: dict[str, list[str
 
 
 def _as_written(data: Any, at: list[str]) -> list[str]:
-    """The way to a value without what pydantic adds: the number 0 of a mapping that stands for a list, and kinds."""
+    """The path to a value without pydantic's additions: kinds, and the index 0 of a mapping in place of a list."""
     written = list[str]()
     for k, part in enumerate(at):
         if isinstance(data, dict):

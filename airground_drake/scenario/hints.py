@@ -1,4 +1,4 @@
-"""Help for a file that is refused: mistakes in YAML in plain words, and what to write where no key exists."""
+"""Help for refused files: explanations of YAML mistakes, and of keys that do not exist."""
 
 import re
 from typing import NamedTuple

@@ -26,7 +26,7 @@ _Share = Annotated[float, wanted("a number from 0 to 1", strict=True, ge=0.0, le
 
 @dataclass(frozen=True, kw_only=True)
 class MapServer:
-    """The keys of a map_server's file. Others are left to others."""
+    """The keys of a map_server's file; other keys are ignored."""
 
     __pydantic_config__: ClassVar = ConfigDict(extra="ignore")
 
@@ -85,7 +85,7 @@ def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
 
 
 def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: str, *, copied: bool = False) -> MapCells:
-    """What the files of a scenario's map say."""
+    """The cells of a scenario's map, read from its files."""
     # starts: of all robots, [x, y, ...], m; what none of them can reach is filled.
     chart = read(folder / given.file, where, copied=copied)
     grid = chart.grid(unknown=given.unknown == "occupied")

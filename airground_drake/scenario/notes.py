@@ -1,4 +1,4 @@
-"""What a scenario says that is allowed and seldom meant, in words for the person who wrote it."""
+"""Warnings about values of a scenario that are allowed but probably unintended."""
 
 from collections.abc import Iterator
 from math import dist
@@ -26,25 +26,25 @@ def notes(scenario: Scenario) -> Iterator[str]:
     ]
     kept = [f"{key} = {value:g} m" for key, value, default, matters in defaults if matters and value == default]
     if kept and (0.0 < radius < SMALL_M or side < NARROW_M):
-        small = f"UGVs with a radius of {radius:g} m" if 0.0 < radius < SMALL_M else f"ways within {side:.2g} m"
-        yield f"{', '.join(kept)}: values of the paper, which are large for {small}; set your own"
+        small = f"UGVs with a radius of {radius:g} m" if 0.0 < radius < SMALL_M else f"a field of {side:.2g} m"
+        yield f"{', '.join(kept)}: the paper's values, which are large for {small}; set your own"
     if scenario.asynchronous:
         yield from _of_old_positions(scenario)
 
 
 def _of_old_positions(scenario: Scenario) -> Iterator[str]:
-    """The pairs of UGVs that may block each other where they meet, and those that start so: the worst of each."""
+    """The worst pair of UGVs that may block each other when they meet, and the worst that starts too close to meet."""
     pairs = [pair for pair in budget(scenario) if pair.unsure_m]
     starts = {name: ugv.start_m for name, ugv in scenario.ugvs.items()}
     room_m = [pair.law_m - pair.unsure_m for pair in pairs]
     spare_m = [dist(starts[pair.first], starts[pair.second]) - pair.law_m - pair.unsure_m for pair in pairs]
     for margins_m, told in (
-        (room_m, "where they meet they can stand for ever"),
-        (spare_m, "they start within the sum of both, so they may only part"),
+        (room_m, "if they meet, they can block each other for ever"),
+        (spare_m, "they start closer than that, so they may only separate"),
     ):
         if min(margins_m, default=1.0) <= 0.0:
             pair = pairs[int(np.argmin(margins_m))]
             count = sum(margin_m <= 0.0 for margin_m in margins_m)
             others = f" (the first of {count} pairs)" if count > 1 else ""
-            room = f"{pair.unsure_m:.3g} m of each other's way beside a distance of {pair.law_m:.3g} m in the law"
-            yield f"{pair.first} and {pair.second}{others} reckon with {room}: {told}"
+            room = f"{pair.law_m:.3g} m in the law plus {pair.unsure_m:.3g} m for the age of positions"
+            yield f"{pair.first} and {pair.second}{others} keep {room}: {told}"

@@ -1,4 +1,4 @@
-"""What commands take: a table of the options that several of them have, and how a command lists its own."""
+"""Command-line options: a table of shared options, and the parser of a command."""
 
 import argparse
 import difflib
@@ -29,7 +29,7 @@ Option = dict[str, Any]  # what argparse is told of an option or argument
 
 
 def option(says: str, metavar: str | None = None, kind: Callable[[str], Any] | None = None, **more: Any) -> Option:
-    """What an option means, how its value is called, and what reads the value; without these two it is a flag."""
+    """An option's help, the name of its value, and its parser; without the last two it is a flag."""
     return {"help": says, **{key: value for key, value in (("metavar", metavar), ("type", kind)) if value}, **more}
 
 

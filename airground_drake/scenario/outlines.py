@@ -1,4 +1,4 @@
-"""The convex parts of an obstacle as outlines: see `model.geometry.outline`."""
+"""Obstacles as outlines of their convex parts: see `model.geometry.outline`."""
 
 import numpy as np
 

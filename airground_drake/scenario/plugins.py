@@ -69,7 +69,7 @@ def refuse(scenario: Scenario, source: str, keys: Collection[str] | None = None)
 
 @contextmanager
 def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[str] | None = None) -> Iterator[None]:
-    """In the body, third-party code is found in the folder of the scenario's file, too; or it is refused."""
+    """In the body, third-party code is also searched for in the folder of the scenario's file, or refused."""
     # The folder comes last on Python's path, so that it cannot hide other modules. Child processes inherit the path.
     # allow: whether third-party code may be imported.
     if not allow:
@@ -80,7 +80,7 @@ def admitted(scenario: Scenario, source: str, *, allow: bool, keys: Collection[s
 
 @contextmanager
 def shown(show: bool) -> Iterator[None]:
-    """In the body, and in processes that start there, what third-party policies print goes to standard error."""
+    """In the body and its child processes, the output of third-party policies goes to standard error."""
     from airground_drake.uav.guest.process import SHOWN
 
     before = dict(os.environ)

@@ -108,85 +108,84 @@ class Ugv:
     """One UGV: a disc of radius `radius_m` on the ground."""
 
     start_m: GroundPoint
-    """Where its body starts, of a unicycle the axle; z = 0."""
+    """Start of its body (of a unicycle: of the axle); z = 0."""
     target_m: GroundPoint
-    """Its target; z = 0. Preset and target are of the point that the law steers."""
+    """Its target; z = 0. Preset and target are for the point that the law steers."""
     preset: Preset
-    """The trajectory that it follows."""
+    """The trajectory that it follows by itself."""
     max_speed_m_s: Positive = 6.0
     """Commands are shortened to this speed."""
     radius_m: NotNegative = 0.0
     """Radius of its body, added to the safe distances of its pairs; 0: a point."""
     plant: Plants = field(default_factory=list)
-    """How it moves; by default as it is told. The law steers a point of it, and keeps what its body needs on top: see
-    `airground budget`. A list combines a delay, and after it a lag."""
+    """Its motion model; by default it follows commands exactly. The law keeps a larger distance for other plants: see
+    `airground budget`. A list combines a delay with a lag after it."""
 
 
 @dataclass(slots=True)
 class Uav:
     """A UAV, a robot in space whose `task` is to fly over the centroid of its UGVs, eqs (9)-(10).
 
-    Another task is named as `module:Class` or `file.py:Class`. `phantoms_m` are obstacles on its map that are
-    not there, points without a radius. Its own body is a ball of radius `radius_m`.
+    Another task is named as `module:Class` or `file.py:Class`. `phantoms_m` are points on its map without a real
+    obstacle. Its body is a ball of radius `radius_m`.
     """
 
     name: Name = UNNAMED
-    """Its name in traces and reports; of one among `uavs` its key."""
+    """Its name in traces and reports; under `uavs`, its key."""
     start_m: AirPoint = field(kw_only=True)
-    """Where it starts."""
+    """Its start."""
     target_m: AirPointOrNone = field(default_factory=list)
-    """Its target; left out or empty: over the centroid of its UGVs' targets, at `altitude_m`."""
+    """Its target; default: above the centroid of its UGVs' targets, at `altitude_m`."""
     altitude_m: Positive = 2.0
-    """Height over the centroid of its UGVs; more than `air_ground_m` plus both radii."""
+    """Height above its UGVs; more than `air_ground_m` plus both radii."""
     task: Annotated[Words, registered(UAV_TASKS)] = "formation"
     """Its task, with lower priority than obstacle avoidance."""
     max_speed_m_s: Positive = 10.0
     """Commands are shortened to this speed."""
     phantoms_m: list[Point] = field(default_factory=list)
-    """Obstacles on its map that are not there."""
+    """Points on its map without a real obstacle."""
     radius_m: NotNegative = 0.0
     """Radius of its body, added to the safe distances of its pairs; 0: a point."""
     plant: Plants = field(default_factory=list)
-    """How it moves; by default as it is told. The law steers a point of it, and keeps what its body needs on top: see
-    `airground budget`. A list combines a delay, and after it a lag."""
+    """Its motion model; by default it follows commands exactly. The law keeps a larger distance for other plants: see
+    `airground budget`. A list combines a delay with a lag after it."""
     ugvs: list[Name] = field(default_factory=list)
-    """The UGVs that it is in charge of: it flies over their centroid, and intervenes on them only. Left out: all that
-    no other UAV lists."""
+    """Its UGVs: it flies over their centroid, and intervenes on them only. Default: all that no other UAV lists."""
     lost_at_s: NotNegative = 0.0
-    """From this time on it neither sends nor hears anything; it flies on. 0: never."""
+    """From this time on it neither sends nor receives anything, and flies on. 0: never."""
 
 
 @dataclass(slots=True)
 class Moves:
-    """The way of an obstacle that moves, without turning: of the origin of its frame, straight between waypoints.
+    """The path of a moving obstacle: the origin of its frame moves straight between waypoints, without rotation.
 
     Each leg takes a whole number of control periods, so the speed is rounded down. Walls and robots do not stop it.
     """
 
     waypoints_m: Annotated[list[Place], Field(min_length=2, max_length=MAX_CORNERS)]
-    """Corners of the way, [x, y] or [x, y, z], at least two."""
+    """Corners of the path, [x, y] or [x, y, z], at least two."""
     speed_m_s: Positive
-    """Speed along it."""
+    """Speed along the path."""
     start_s: NotNegative = 0.0
-    """When it starts; until then it stands at the first waypoint."""
+    """Start of the motion; until then the obstacle stands at the first waypoint."""
     at_end: Annotated[Words, one_of(AT_END)] = "stop"
-    """At the last waypoint it stops, goes back the way it came, or goes straight to the first one and on."""
+    """At the last waypoint it stops, reverses, or continues straight to the first one."""
 
 
 @dataclass(slots=True)
 class Obstacle:
-    """An obstacle from which robots keep the safe distance of (7)-(8); by default a ball, or without a radius a point.
+    """An obstacle from which robots keep the safe distance of (7)-(8); by default a ball (a point without a radius).
 
-    At most one of `polygon_m`, `segment_m` and `size_m` gives it another shape. These are in the frame of the obstacle:
-    its origin is at `position_m`, and it is turned by `heading_rad`. By default that is the world frame.
+    At most one of `polygon_m`, `segment_m` and `size_m` gives it another shape. Its coordinates are in the obstacle's
+    frame, with origin `position_m`, rotated by `heading_rad`; by default that is the world frame.
     """
 
     position_m: PlaceOrNone = field(default_factory=list)
-    """Centre of a ball or box, else origin of its frame: [x, y] or [x, y, z]. Needed for a ball."""
+    """Centre of a ball or box, otherwise origin of its frame: [x, y] or [x, y, z]. Needed for a ball."""
     known_to_uav: YesNo = True
     """Whether it is on the UAV's map from the beginning."""
     radius_m: NotNegative = 0.0
-    """Radius of a ball; of another shape, how far it extends round its corners and edges."""
+    """Radius of a ball; for other shapes, the radius by which corners and edges are rounded outwards."""
     polygon_m: CornersOrNone = field(default_factory=list)
     """Corners [x, y] of a polygon, in order, at least three; edges must not cross."""
     segment_m: CornersOrNone = field(default_factory=list)
@@ -194,31 +193,31 @@ class Obstacle:
     size_m: SizeOrNone = field(default_factory=list)
     """Length and width [x, y] of a box about `position_m`."""
     heading_rad: Heading = 0.0
-    """Turns a polygon, wall or box about `position_m`, counter-clockwise."""
+    """Rotates a polygon, wall or box about `position_m`, counter-clockwise."""
     height_m: NotNegative = 0.0
-    """It stands from the ground to this height; 0: flat, or a ball. For UGVs all walls are endless."""
+    """It extends from the ground to this height; 0: flat, or a ball. UGVs treat walls as infinitely high."""
     distance_m: NotNegative = 0.0
-    """Distance to keep from it, in place of `safe_distance.obstacle_m` or `moving_m`; 0: that one."""
+    """Distance to keep from it, in place of `safe_distance.obstacle_m` or `moving_m`; 0: use these."""
     moves: Moves | None = None
-    """How it moves; then its frame has no `position_m`."""
+    """Its motion, in place of `position_m`."""
     max_speed_m_s: NotNegative = 0.0
-    """Speed at which robots expect it to move at most; 0: that of `moves`, or none. Without `moves` it might move."""
+    """Largest speed that robots expect of it; 0: the speed of `moves`, if any."""
     known_motion: YesNo = False
-    """Whether predictions know its way, or its present velocity only. No distance rests on it."""
+    """Whether predictions use its path, or only its present velocity. Guaranteed distances do not depend on this."""
     appears_s: NotNegative = 0.0
-    """It is there from the first control sample at or after this time on; before that, it is nowhere."""
+    """It exists from this time on, rounded up to a control sample."""
     disappears_s: NotNegative = 0.0
-    """It is nowhere from the first control sample at or after this time on; 0: it stays."""
+    """It exists until this time, rounded up to a control sample; 0: always."""
 
     @property
     def expected_speed_m_s(self) -> float:
-        """Speed at which robots expect it to move at most, m/s."""
+        """Largest speed that robots expect of it, m/s."""
         return self.max_speed_m_s or (self.moves.speed_m_s if self.moves else 0.0)
 
 
 @dataclass(slots=True)
 class MapCells:
-    """What was read from the files of a map: filled in when a scenario is loaded.
+    """The cells read from the files of a map, filled in when a scenario is loaded.
 
     So the scenario in a report needs no other file. A free cell that no robot can reach from its start counts as
     occupied.
@@ -231,7 +230,7 @@ class MapCells:
     sha256: dict[Words, Words]
     """SHA-256 of the YAML file and of its image, by name."""
     starts_m: list[Corner]
-    """Where the robots started."""
+    """Starts of the robots."""
     cell_m: Positive
     """Side of a cell."""
     origin: Annotated[list[Real], Field(min_length=3, max_length=3)]
@@ -247,8 +246,8 @@ class MapCells:
     unreached: CountFromZero
     """Number of free cells that no robot can reach from these starts."""
     rectangles: Annotated[list[CellRectangle], Field(max_length=MAX_RECTANGLES)]
-    """Rectangles of cells whose union is in the way: first row, row after the last, first column, column after the
-    last. They may overlap."""
+    """Rectangles that cover the occupied cells: first row, row after the last, first column, column after the last.
+    They may overlap."""
 
     def __str__(self) -> str:
         """One line for people."""
@@ -259,20 +258,20 @@ class MapCells:
 
 @dataclass(slots=True)
 class Map:
-    """A map in the files of ROS's map_server (YAML and image): all its cells that are in the way are one obstacle."""
+    """A map in the files of ROS's map_server (YAML and image): its occupied cells are one obstacle."""
 
     file: Annotated[Words, Field(min_length=1)]
     """Path of the YAML file, from the folder of the scenario."""
     height_m: NotNegative = 0.0
-    """What is in the way stands from the ground to this height; 0: the UAV flies over it. For UGVs it is endless."""
+    """Height of occupied cells; 0: the UAV flies over them. UGVs treat them as infinitely high."""
     distance_m: NotNegative = 0.0
-    """Distance to keep from it, in place of `safe_distance.obstacle_m`; 0: that one."""
+    """Distance to keep from it, in place of `safe_distance.obstacle_m`; 0: use that."""
     known_to_uav: YesNo = True
     """Whether the UAV has the map from the beginning."""
     unknown: Annotated[Words, one_of(("occupied", "free"))] = "occupied"
-    """What cells count as that are unknown: grey 205, transparent, or between the thresholds."""
+    """How unknown cells count: grey 205, transparent, or between the thresholds."""
     cells: MapCells | None = None
-    """What was read from the files; filled in."""
+    """The cells read from the files; filled in."""
 
 
 @dataclass(slots=True)
@@ -294,15 +293,15 @@ class SafeDistance:
     obstacle_m: Positive = 2.0
     """Between a robot and an obstacle."""
     moving_m: NotNegative = 0.0
-    """Between a robot and an obstacle that moves; 0: `obstacle_m`."""
+    """Between a robot and a moving obstacle; 0: `obstacle_m`."""
     ugv_m: Positive = 2.0
     """Between two UGVs."""
     air_ground_m: Positive = 1.0
     """Between a UAV and a UGV."""
     uav_m: NotNegative = 0.0
-    """Between two UAVs; needed with several."""
+    """Between two UAVs; needed if there are several."""
     collision_m: Positive = 0.05
-    """A smaller distance counts as a collision; less than the other distances."""
+    """A smaller distance is a collision; must be less than the other distances."""
 
 
 @dataclass(slots=True)
@@ -312,7 +311,7 @@ class Control:
     period_s: Positive = 0.025
     """Control period h of all robots."""
     avoidance_gain_1_s: NotNegative = 3.0
-    """Gain A of obstacle avoidance. Gain times period is at most 1, as for all gains; 1/period is rounded down."""
+    """Gain A of obstacle avoidance; like all gains, at most 1/`period_s`."""
     motion_gain_1_s: NotNegative = 2.0
     """Gain of tracking the preset trajectory, (6)."""
     formation_gain_1_s: NotNegative = 5.0
@@ -320,53 +319,55 @@ class Control:
     intervention_gain_1_s: NotNegative = 1.5
     """Gain of tracking an intervention, (14)."""
     sensing_range_m: Positive = 4.0
-    """Robots sense nothing beyond it; it covers every safe distance, both radii and a period of closing speed."""
+    """Sensing range; at least safe distance, both radii and the distance that closes in a period, for every pair."""
     law: Annotated[Words, one_of(LAWS)] = "shared"
-    """How two UGVs keep apart. 'shared': each does half, by positions of this sample. 'asynchronous', with
-    `channel.ugvs`: by positions of any age. A UGV keeps off all places where the other one can be until that one
-    decides again, so they need more room: within V (age + period) besides the safe distance they may only part."""
+    """How two UGVs keep apart. 'shared': each takes half of an inequality, with positions of this sample.
+    'asynchronous', with `channel.ugvs`: with positions of any age. A UGV avoids all points that the other can reach
+    before it decides again. This needs more room: closer than the safe distance plus V (age + period) they may only
+    separate."""
 
 
 @dataclass(slots=True)
 class Sensing:
-    """Measured positions: each robot publishes one, off by a bounded error, and all robots and gatekeepers act on it.
+    """Measured positions: each robot publishes one with a bounded error, and all robots and gatekeepers act on it.
 
-    The law keeps as much more as that costs (`airground budget`), and robots stand where measured inequalities
-    contradict one another. 'drawn' errors change smoothly. 'adversarial' ones are at the bound: the nearest thing looks
-    farther ('away') or is seen in another direction ('sideways'), by turns of half a second. Where obstacles are is
-    known; beside one that may move a robot only goes where it surely gets no nearer, or stands.
+    The law keeps a larger distance to allow for the errors (`airground budget`), and robots stand still if measured
+    inequalities contradict one another. 'drawn' errors change smoothly. The other errors are at the bound: the nearest
+    body appears farther away ('away') or in another direction ('sideways'); 'adversarial' chooses one of them at random
+    every half second. Positions of obstacles are exact; beside an obstacle that may move, a robot only moves in
+    directions that cannot bring it nearer whatever the error, or stands still.
     """
 
     position_error_m: NotNegative = 0.0
     """Largest error of a robot's published position."""
     errors: Annotated[Words, one_of(ERRORS)] = "drawn"
-    """How they come."""
+    """The kind of errors."""
     correlation_s: Positive = 1.0
-    """Time after which a drawn error is a new one; in between it is linear."""
+    """Time between independent drawn errors, which are interpolated linearly."""
     uav_error_m: NotNegative = 0.0
-    """Largest error of a UGV's position that the UAV plans with, drawn; no distance rests on it."""
+    """Largest (drawn) error of the positions with which the UAV plans. Guaranteed distances do not depend on it."""
     seed: CountFromZero = 0
     """Seed of the errors."""
 
 
 @dataclass(slots=True)
 class Faults:
-    """What goes beyond the bounds that a scenario declares: it is said of each run which hypothesis broke first.
+    """Faults that exceed the declared bounds. The report says for each run which hypothesis failed first.
 
-    A robot that does not go where it is told is a plant of your own that exceeds its `drift_m_s`.
+    For a robot that does not follow its commands, use a plant of your own that exceeds its `drift_m_s`.
     """
 
     position_error_m: NotNegative = 0.0
-    """By how much more a robot's published position is off than `sensing.position_error_m` allows."""
+    """Excess of position errors over `sensing.position_error_m`."""
     late: Chance = 0.0
-    """Share of control samples at which announced positions come a period later than `channel.ugvs` allows."""
+    """Share of control samples at which announced positions arrive one period later than `channel.ugvs` allows."""
 
 
 @dataclass(slots=True)
 class OwnController:
-    """A controller of the user's own for all UGVs, a Drake System with the outputs of the package's.
+    """The user's own controller of all UGVs, a Drake System with the same outputs as the package's.
 
-    Distances and the steps of a run are judged as any; claims about the package's law and its predictions are not run.
+    Distances and steps are judged as usual; claims about the package's law and its predictions are not run.
     """
 
     kind: Annotated[Words, registered(UGV_CONTROLLERS)]
@@ -377,9 +378,9 @@ class OwnController:
 
 @dataclass(slots=True)
 class Threshold:
-    """Decision threshold zeta: rule 'fixed' takes zeta_m; 'bayes' minimises the Bayes risk (16)-(18).
+    """Decision threshold zeta. The rule 'fixed' uses zeta_m; 'bayes' minimises the Bayes risk (16)-(18).
 
-    'printed' takes the root of (19) as the paper prints it, for comparison: it does not minimise the risk.
+    'printed' uses the root of (19) as printed in the paper, for comparison: it does not minimise the risk.
     """
 
     rule: Annotated[Words, one_of(("fixed",), "model.trigger.bayes:COMPUTED")] = "fixed"
@@ -405,15 +406,15 @@ class Decision:
     trigger: Annotated[Words, one_of(TRIGGERS)] = "automaton"
     """With hysteresis and a minimum inter-event time, or without both, as in the paper."""
     release_m: Positive = 1.5
-    """An intervention ends when the decision variable falls to it; below the threshold."""
+    """Release level: an intervention ends when the decision variable falls to it; below the threshold."""
     min_inter_event_s: NotNegative = 0.5
-    """Minimum inter-event time: no trigger follows another sooner."""
+    """Minimum time between two triggers of a UGV."""
     noise_m_sqrt_s: NotNegative = 0.0
     """Noise of the decision variable in the simulation."""
     leak_1_s: NotNegative = 0.0
     """Rate at which accumulated noise decays; 0: never."""
     noise_period_s: Positive = 0.025
-    """How often noise is drawn."""
+    """Sampling period of the noise."""
 
     def levels(self, zeta_m: float) -> tuple[float, float, float]:
         """Threshold and release level, m, and dwell, s; the bare trigger has no release level and no dwell."""
@@ -422,31 +423,31 @@ class Decision:
 
 @dataclass(slots=True)
 class Policy:
-    """One entry of the UAV's behaviour database: a policy's name and its numbers."""
+    """One entry of the UAV's behaviour database: a policy and its parameters."""
 
     name: Annotated[Words, registered(POLICIES)]
-    """Which policy."""
+    """Name of the policy."""
     parameters: dict[Name, Real] = field(default_factory=dict)
-    """Its numbers, by name."""
+    """Its parameters, numbers by name."""
 
 
 @dataclass(slots=True)
 class Intervention:
-    """The UAV's intervention behaviours; how often it plans, and how long it rests after a refusal.
+    """The UAV's policies, its planning period, and its rest after a refusal.
 
-    `ranking` is 'listed' (in the order of the list) or 'predicted' (best predicted outcome on the UAV's map
-    first). A policy that takes longer than `budget_s` for a proposal proposes nothing. A policy that bounds its effort
-    in counts, such as `coordinate`, has no time limit; a third-party one has at least a minute.
+    `ranking` is 'listed' (in the order of the list) or 'predicted' (best predicted outcome on the UAV's map first). A
+    policy that takes longer than `budget_s` proposes nothing. A policy with a fixed number of iterations, such as
+    `coordinate`, has no time limit; a third-party one has at least a minute.
     """
 
     period_s: Positive = 0.05
-    """How often the UAV plans; a multiple of the control period."""
+    """Planning period of the UAV; a multiple of the control period."""
     retry_s: NotNegative = 1.0
-    """How long it rests after a refusal; without a proposal of any policy, twice as long each time in a row."""
+    """Time until the UAV asks again after a refusal; doubled each time that no policy has a proposal."""
     ranking: Annotated[Words, one_of((), "uav.database:RANKINGS")] = "predicted"
-    """Which policy is asked first."""
+    """Order in which policies are asked."""
     budget_s: Positive = 2.0
-    """Wall-clock time for a policy's proposal."""
+    """Wall-clock limit of a policy for one proposal."""
     policies: list[Policy] = field(default_factory=list)
     """The behaviour database, in order."""
 
@@ -455,33 +456,34 @@ class Intervention:
 class Gatekeeper:
     """The accept/refuse decision, eqs (21)-(29).
 
-    Under method (c) a decision on a proposal is reversed only for a plan that is cheaper by the (relative) switching
-    margin, and not before `min_dwell_s` have passed. This rule is ours. The paper's rule, `first_stage`, executes the
-    first stage of each rounded plan, whatever the earlier answers were; with the route `nonlinear` that is by the
-    letter of (27)-(29), with two choices that the paper leaves open: the search starts at the cheaper constant plan,
-    and the velocities of (23) are those along the constant plans. A decision may take `budget_iterations` iterations of
-    the solver of a relaxation and 2,000 iterations of the searches of `mixed_integer`. The budget 'counted' has no
-    other limit: a run is the same on every machine on which these iterations take less than 1 s, ten times the usual.
-    The budget 'wall_clock', for real time, also limits a decision to the share `budget_share` of the sampling period.
-    `terminal_weight_s` is the w of a terminal cost w a ||rho_rd - rho_N||^2 besides (25); the paper has no such cost.
+    Under method (c), by our rule `hysteresis`, an answer is reversed only if the plan is cheaper by the relative
+    `switching_margin`, and not before `min_dwell_s` have passed. The paper's rule, `first_stage`, executes the first
+    stage of each rounded plan, whatever the earlier answers were. With the route `nonlinear` it follows (27)-(29)
+    literally, with two choices that the paper leaves open: the search starts at the cheaper constant plan, and the
+    velocities of (23) are those along the constant plans. A decision may take `budget_iterations` iterations of a
+    relaxation's solver and 2,000 iterations of the searches of `mixed_integer`. The budget 'counted' has no other
+    limit, so a run is the same on every machine, if these iterations take less than 1 s (usually a tenth of that). The
+    budget 'wall_clock', for real time, also limits a decision to the share `budget_share` of the sampling period.
+    `terminal_weight_s` is the weight w of a terminal cost w a ||rho_rd - rho_N||^2 in addition to (25), which the paper
+    does not have.
 
     Method (d) compares outcomes instead, up to `settling_s` past the end of motion and preset trajectory. An accepted
-    proposal is executed for `longest_s` at most. After `tries` accepted proposals a UGV accepts no other until it has
-    been on its own for `rest_s`.
+    proposal is executed for `longest_s` at most. After `tries` accepted proposals a UGV accepts no more until it has
+    followed its own task for `rest_s`.
     """
 
     route: Annotated[Words, registered(ROUTES)] = "mixed_integer"
-    """How (26) is solved under method (c)."""
+    """Solver route of (26) under method (c)."""
     period_s: Positive = 0.05
-    """How often it decides; a multiple of the control period."""
+    """Decision period; a multiple of the control period."""
     horizon_s: Positive = 3.0
-    """How far (26) looks ahead, and how long other robots are predicted to go on."""
+    """Horizon of (26), and time for which other robots are predicted to keep their velocities."""
     stages: Annotated[Count, Field(le=MAX_STAGES)] = 60
     """Stages of (26): horizon_s / stages is a multiple of the control period."""
     blocks: CountFromZero = 0
-    """Accept variables of (26), each for a block of stages, for route mixed_integer; 0: one per stage."""
+    """Number of accept variables of (26), each for a block of stages (route mixed_integer); 0: one per stage."""
     solver: Annotated[Words, one_of(("daqp", "gurobi", "mosek"))] = "daqp"
-    """Solver of the route mixed_integer; gurobi and mosek need a Drake that has them, and a licence."""
+    """Solver of the route mixed_integer; gurobi and mosek need a Drake with these solvers, and a licence."""
     error_weight_1_m2_s: Positive = 1.0
     """a of (25): weight of the distance to the preset trajectory."""
     slack_weight_1_m2_s: NotNegative = 1000.0
@@ -489,13 +491,13 @@ class Gatekeeper:
     terminal_weight_s: NotNegative = 0.0
     """Weight w of a terminal cost, which the paper does not have."""
     rule: Annotated[Words, one_of(RULES)] = "hysteresis"
-    """How a plan becomes the answer under method (c): with margin and dwell, or by its first stage alone."""
+    """How a plan determines the answer under method (c): with margin and dwell, or by its first stage alone."""
     switching_margin: NotNegative = 0.05
     """Relative amount by which a plan must be cheaper to reverse a decision of method (c)."""
     min_dwell_s: NotNegative = 0.2
-    """Shortest time for which a decision of method (c) stands."""
+    """Minimum time between two different answers of method (c)."""
     budget: Annotated[Words, one_of(("counted", "wall_clock"))] = "counted"
-    """Limits of a decision's effort: counts only, or also the clock."""
+    """Limits of a decision's effort: iteration counts only, or also wall-clock time."""
     budget_iterations: Count = 100
     """Largest number of iterations of the solver of a relaxation."""
     budget_share: Share = 0.5
@@ -507,21 +509,21 @@ class Gatekeeper:
     tries: Count = 5
     """Number of acceptances before a rest."""
     rest_s: Positive = 5.0
-    """Length of that rest, in which the UGV is on its own."""
+    """Length of that rest, during which the UGV follows its own task."""
 
 
 @dataclass(slots=True)
 class WayBack:
-    """The way from UGVs to the UAV where it differs from the way there: what is left out is as there."""
+    """The link from UGVs to the UAV: only the values that differ from those of `channel`."""
 
     delay_s: NotNegative | None = None
-    """How late every message is."""
+    """Delay of every message."""
     jitter_s: NotNegative | None = None
-    """By how much more a message may be late, uniformly."""
+    """Largest additional delay of a message, uniformly distributed."""
     loss: Loss | None = None
     """Share of messages that are lost."""
     burst_s: NotNegative | None = None
-    """Mean duration of a loss, 0.001 s at least; 0: each message is lost for itself."""
+    """Mean duration of an outage, 0.001 s at least; 0: messages are lost independently."""
     duplicate: Chance | None = None
     """Share of messages that arrive twice."""
     reorder: YesNo | None = None
@@ -530,86 +532,84 @@ class WayBack:
 
 @dataclass(slots=True)
 class UgvLinks:
-    """How late and how often UGVs hear where the other UGVs are; without it they always know.
+    """Delay and loss of positions sent between UGVs; without it UGVs always know each other's positions.
 
-    A UGV publishes at a control sample where it will be at the next one, so a delay of up to a control period costs
-    nothing. It stands in a period in which it lacks a message of another UGV, unless that one is surely far: the last
-    position that it knows, less what the other may have driven since, is farther than the law asks for. Starts are
-    known. Predictions of gatekeepers take all messages for received.
+    At a control sample a UGV publishes its position at the next sample, so a delay of up to one control period costs
+    nothing. If it misses the message of another UGV, it stands still for that period, unless the other one is certainly
+    far: the distance from its last known position, minus the distance that it may have driven since, exceeds the law's
+    distance. Starts are known. Predictions of gatekeepers assume that all messages arrive.
 
-    With `control.law: asynchronous` a UGV publishes where it is, and others act on the last position that they have,
-    however old that is. Predictions of gatekeepers know where the others are, and reckon with positions as old as the
-    delay makes them.
+    With `control.law: asynchronous` a UGV publishes its current position, and others act on the last received position,
+    however old it is. Predictions of gatekeepers use true positions, with the age given by the delay.
     """
 
     delay_s: NotNegative = 0.0
-    """How late a position is; at most the control period, but for `control.law: asynchronous`."""
+    """Delay of a position; at most the control period, except with `control.law: asynchronous`."""
     loss: Loss = 0.0
-    """Share of positions that are lost, by receiver."""
+    """Share of positions that are lost, for each receiver."""
 
 
 @dataclass(slots=True)
 class Channel:
-    """What happens to messages between UAVs and UGVs. Without it they arrive at once, and none is lost.
+    """Delay and loss of messages between UAVs and UGVs; without it messages arrive at once, and none is lost.
 
-    The fate of a message depends on `seed`, its link, its number and how often it was sent before; with `burst_s` on
-    when it is sent, too. Who waits for an answer repeats the message after the delays of both ways, the larger jitter
-    and 0.15 s (or one period each of gatekeeper, control and planner, if that is longer). All robots know where the
-    others are; with `ugvs` UGVs know other UGVs only from messages.
+    Delay and loss of a message depend on `seed`, its link, its number and how often it was sent before; with `burst_s`
+    also on the time. A sender without an answer repeats its message after the delays of both links, the larger jitter
+    and 0.15 s (or one period each of gatekeeper, control and planner, if that is longer). All robots know the positions
+    of the others; with `ugvs` UGVs know those of other UGVs only from messages.
     """
 
     delay_s: NotNegative = 0.0
-    """How late every message is."""
+    """Delay of every message."""
     jitter_s: NotNegative = 0.0
-    """By how much more a message may be late, uniformly."""
+    """Largest additional delay of a message, uniformly distributed."""
     loss: Loss = 0.0
     """Share of messages that are lost."""
     burst_s: NotNegative = 0.0
-    """Mean duration of a loss, 0.001 s at least; 0: each message is lost for itself."""
+    """Mean duration of an outage, 0.001 s at least; 0: messages are lost independently."""
     duplicate: Chance = 0.0
     """Share of messages that arrive twice."""
     reorder: YesNo = True
     """Whether a message may overtake another one."""
     seed: CountFromZero = 1
-    """Decides which messages are lost, doubled and late."""
+    """Seed of losses, duplicates and delays."""
     up: WayBack | None = None
-    """The way back, from UGVs to the UAV; by default it is as the way there."""
+    """The link from UGVs to the UAV; by default the same as the link to the UGVs."""
     ugvs: UgvLinks | None = None
-    """The positions of UGVs on their way to other UGVs; the same in all runs."""
+    """Positions sent between UGVs; the same in all runs."""
 
 
 @dataclass(slots=True)
 class Run:
-    """One simulation: a method (see `airground list methods`) and what is expected of it.
+    """One simulation: a method (see `airground list methods`) and its expected results.
 
-    `stalls_m` names the UGVs that must end (to within `stall_tolerance_m`) at that point short of their
-    target. `expected` maps claim identifiers to the expected verdict; a claim that is not named must hold.
-    `nothing` is for a claim about which the method promises nothing. `exercised` means "holds, and the run tested it".
-    `interventions: 2` in `expected` demands that UGVs begin to execute at least two proposals, `messages: 5` that at
-    least five proposals and answers are delivered.
-    `set: {decision.threshold.zeta_m: 2.0}` gives this run a value of its own, as `--set` does for all runs. Claims
-    about the model that use a changed constant are judged for this run, too; `expected` may name them.
+    `stalls_m` gives UGVs that must stall at a point short of their target, to within `stall_tolerance_m`. `expected`
+    maps claim identifiers to expected verdicts; a claim that is not named must hold. Use `nothing` for a claim about
+    which the method promises nothing. `exercised` means "holds, and the run tested it". `interventions: 2` in
+    `expected` requires that UGVs begin to execute at least two proposals, `messages: 5` that at least five proposals
+    and answers are delivered. `set: {decision.threshold.zeta_m: 2.0}` sets a value for this run, as `--set` does for
+    all runs. Claims about the model that use a changed constant are also judged for this run; `expected` may name them.
     """
 
     method: Annotated[Words, one_of(METHODS)]
     """How UAV and UGVs are coupled."""
     composition: Annotated[Words, one_of((), "model.law.avoidance:COMPOSITIONS")] = "augmented"
-    """How avoidance is composed with the tasks below: 'augmented' or a reading of recursion (5)."""
+    """Composition of avoidance with lower tasks: 'augmented', or an interpretation of recursion (5)."""
     set: Annotated[dict[Words, OneValue], settings_of(SETTABLE)] = field(default_factory=dict)
     """Other values in this run, by dotted key of `channel`, `decision`, `gatekeeper` or `intervention`."""
     stalls_m: dict[Name, GroundPoint] = field(default_factory=dict)
     """Points at which UGVs must end short of their target, by UGV."""
     expected: Annotated[dict[Words, Any], expected_of(RUN_CLAIMS)] = field(default_factory=dict)
-    """Expected verdicts of claims about this run, by claim; other claims must hold. Least numbers of interventions and
-    messages."""
+    """Expected verdicts of claims about this run, by claim; other claims must hold. Also the least numbers of
+    interventions and messages."""
 
 
 @dataclass(slots=True)
 class Reproduction:
     """One row of the reproduction table: a measure of a run against the paper's value.
 
-    `calibrated`: a value that the paper leaves open was chosen so that this one comes out. `by_construction`: the
-    scenario itself sets the value, so nothing is reproduced. `ambiguous` states another reading of the paper; the row
+    `calibrated`: a value that the paper leaves open was chosen to obtain this one. `by_construction`: the scenario
+    itself sets the value, so nothing is reproduced. `ambiguous` states another interpretation of the paper; the row
     then counts as neither reproduced nor not reproduced.
     """
 
@@ -630,11 +630,11 @@ class Reproduction:
     tolerance: NotNegative = 0.0
     """Largest allowed difference from the paper's value."""
     calibrated: YesNo = False
-    """Whether a value that the paper leaves open was chosen so that this one comes out."""
+    """Whether a value that the paper leaves open was chosen to obtain this one."""
     why: Words = ""
-    """Why the row is as it is."""
+    """Explanation of the row."""
     ambiguous: Words = ""
-    """Another way to read the paper, in words."""
+    """Another interpretation of the paper, in words."""
     by_construction: YesNo = False
     """Whether the scenario itself sets the value."""
 
@@ -644,7 +644,7 @@ class Choice:
     """Origin of a value that is not from the paper.
 
     `source` is 'calibrated' if it was chosen so that a result matches the paper's, else 'ours'. An override of the
-    value (`--set`) makes it 'set', and takes the place of the reason.
+    value (`--set`) makes it 'set', and replaces the reason.
     """
 
     key: Words
@@ -667,8 +667,8 @@ class Scenario:
     """A scenario file. The order of `ugvs` and `obstacles` is the order of all arrays.
 
     `expected` maps identifiers of claims about the model (proofs and experiments, the same for all runs) to the
-    expected verdict; one that is not named must be proved, or supported if it is statistical. `claims` adds claims
-    to those of the package: `module:Class` or `file.py:Class` by identifier.
+    expected verdict; other claims must be proved, or supported if they are statistical. `claims` adds the user's own
+    claims: `module:Class` or `file.py:Class` by identifier.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid", revalidate_instances="always")
@@ -690,13 +690,13 @@ class Scenario:
     ugvs: Annotated[dict[Name, Ugv], Field(min_length=1, max_length=MAX_UGVS)] = field(kw_only=True)
     """The UGVs, 1 to 100, by name, in the order of all arrays."""
     uav: Uav | None = field(default=None, kw_only=True)
-    """The UAV; with several, `uavs` takes its place."""
+    """The UAV; for several UAVs use `uavs` instead."""
     uavs: dict[Name, Uav] = field(default_factory=dict, kw_only=True)
-    """Several UAVs by name, in place of `uav` and with its keys; each UGV is in the charge of one of them."""
+    """Several UAVs by name, in place of `uav` and with its keys; each UGV is assigned to one of them."""
     obstacles: dict[Name, Obstacle] = field(default_factory=dict)
     """The obstacles, by name."""
     arena_m: TwoCornersOrNone = field(default_factory=list)
-    """Opposite corners [x, y] of a rectangle whose endless walls keep all robots inside."""
+    """Opposite corners [x, y] of a rectangle that encloses all robots, with infinitely high walls."""
     map: Map | None = None
     """A map of ROS."""
     safe_distance: SafeDistance = field(default_factory=SafeDistance)
@@ -708,7 +708,7 @@ class Scenario:
     sensing: Sensing | None = None
     """Errors of measured positions."""
     faults: Faults | None = None
-    """Faults beyond what is declared."""
+    """Faults that exceed the declared bounds."""
     decision: Decision = field(default_factory=Decision)
     """The event trigger."""
     intervention: Intervention = field(default_factory=Intervention)
@@ -716,7 +716,7 @@ class Scenario:
     gatekeeper: Gatekeeper = field(default_factory=Gatekeeper)
     """The UGVs' decisions about proposals."""
     channel: Channel | None = None
-    """What happens to messages; by default they arrive at once."""
+    """Delay and loss of messages; by default messages arrive at once."""
     runs: Annotated[dict[Name, Run], Field(min_length=1)] = field(kw_only=True)
     """The simulations, by name."""
     claims: Annotated[dict[Words, Words], CLAIMS] = field(default_factory=dict)

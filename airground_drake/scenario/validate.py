@@ -33,8 +33,8 @@ from airground_drake.scenario.shapes import crossing, near_edge
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 TOLERANCE = 1e-9  # m between points; relative between periods
-SHORTEST_S = 1e-3  # of a spell in which a link loses everything: all of a run are drawn in advance
-_SHORT = 1.0 - 1e-5  # of a limit that is printed with six digits, so that what a message allows is allowed
+SHORTEST_S = 1e-3  # shortest mean outage of a link: all outages of a run are drawn in advance
+_SHORT = 1.0 - 1e-5  # factor of limits printed with six digits, so that the printed value is allowed
 
 Problems = Iterator[tuple[str, object, str]]
 
@@ -53,7 +53,7 @@ def _one_of(key: str, value: str, allowed: Iterable[str], what: str) -> Problems
 
 
 def _uavs(scenario: Scenario) -> Problems:
-    """There is a UAV, and several keep apart."""
+    """There is a UAV; several UAVs have a distance to keep from each other."""
     if scenario.uav and scenario.uavs:
         yield "uavs", Fault("uav is given, too"), "one of both: uavs has all UAVs by name"
     if not scenario.aerial:
@@ -66,7 +66,7 @@ def _uavs(scenario: Scenario) -> Problems:
 
 
 def _policies(scenario: Scenario) -> Problems:
-    """Policies of the package take their parameters."""
+    """The package's policies get parameters that they know."""
     for k, policy in enumerate(scenario.intervention.policies):
         why, _, takes = POLICIES.misfit(policy.name, policy.parameters).partition("; ")
         if why:
@@ -74,36 +74,36 @@ def _policies(scenario: Scenario) -> Problems:
 
 
 def _charges(scenario: Scenario) -> Problems:
-    """Each UGV is in the charge of one UAV."""
+    """Each UGV is assigned to one UAV."""
     charged = dict[str, str]()
     for name, uav in scenario.aerial.items():
         for k, ugv in enumerate(uav.ugvs):
             key = f"{scenario.key_of(name)}.ugvs.{k}"
             yield from _one_of(key, ugv, scenario.ugvs, "one of the UGVs")
             if ugv in charged:
-                elsewhere = f"it is in {scenario.key_of(charged[ugv])}.ugvs: leave it out of one list"
-                yield key, ugv, f"a UGV in nobody else's charge; {elsewhere} (no UAV hands a UGV over to another)"
+                elsewhere = f"it is in {scenario.key_of(charged[ugv])}.ugvs: remove it from one list"
+                yield key, ugv, f"a UGV of no other UAV; {elsewhere}"
             charged[ugv] = name
     without = [name for name, uav in scenario.uavs.items() if not uav.ugvs]
     if without:
-        why = f"{without[1]} has no list, too" if len(without) > 1 else "the lists of the other UAVs have all UGVs"
-        yield f"uavs.{without[0]}.ugvs", Fault("missing"), f"wanted: a list of UGVs that it is in charge of: {why}"
+        why = f"{without[1]} has no list, too" if len(without) > 1 else "the other UAVs' lists contain all UGVs"
+        yield f"uavs.{without[0]}.ugvs", Fault("missing"), f"wanted: the list of its UGVs: {why}"
     for ugv in scenario.ugvs if charged else ():
         if ugv not in charged:
             lists = " or ".join(f"{scenario.key_of(name)}.ugvs" for name in scenario.aerial)
             allowed = f"wanted: in {lists}, or one UAV without a list, which gets the rest"
-            yield f"ugvs.{ugv}", Fault("in no UAV's charge"), allowed
+            yield f"ugvs.{ugv}", Fault("assigned to no UAV"), allowed
 
 
 def _bursts(scenario: Scenario) -> Problems:
-    """The spells of a link can be counted."""
+    """Outages of a link are not too short to be drawn one by one."""
     for key, way in (("channel", scenario.channel), ("channel.up", scenario.channel and scenario.channel.up)):
         if way is not None and 0.0 < (way.burst_s or 0.0) < SHORTEST_S:
-            yield f"{key}.burst_s", way.burst_s, f"0: each message is lost for itself; or at least {SHORTEST_S:g} s"
+            yield f"{key}.burst_s", way.burst_s, f"0: independent losses; or at least {SHORTEST_S:g} s"
 
 
 def _ugv_links(scenario: Scenario) -> Problems:
-    """Positions arrive within a control period, of UGVs that are where they say; the law of the package hears them."""
+    """Positions arrive within a control period, unless the law is asynchronous; the package's law uses them."""
     if (link := scenario.ugv_links) is None:
         return
     if scenario.ugv_controller is not None:
@@ -111,28 +111,28 @@ def _ugv_links(scenario: Scenario) -> Problems:
     for run, spec in scenario.runs.items():
         for key, value in spec.set.items():
             if key.startswith("channel.ugvs"):
-                yield f"runs.{run}.set.{key}", value, "the same in all runs: distances rest on it"
+                yield f"runs.{run}.set.{key}", value, "the same in all runs: guaranteed distances depend on it"
     period_s = scenario.control.period_s
     if decimal(link.delay_s) > decimal(period_s) and not scenario.asynchronous:
-        told = f"at most control.period_s = {period_s:.9g} s: a robot publishes where it will be a period later"
-        would = f"control.period_s = {link.delay_s:.9g} would do, or control.law = asynchronous"
-        yield "channel.ugvs.delay_s", link.delay_s, f"{told}; {would}"
+        limit = f"at most control.period_s = {period_s:.9g} s: a robot publishes its position one period ahead"
+        remedy = f"use control.period_s = {link.delay_s:.9g} or control.law = asynchronous"
+        yield "channel.ugvs.delay_s", link.delay_s, f"{limit}; {remedy}"
 
 
 def _asynchronous(scenario: Scenario) -> Problems:
-    """Old positions are covered of discs that move as they are told, and are exact; nothing is above avoidance."""
+    """The asynchronous law needs discs with exact motion, exact positions, and methods with avoidance on top."""
     if not scenario.asynchronous:
         return
     told = "with control.law: asynchronous"
     if scenario.ugv_links is None:
-        yield "control.law", "asynchronous", "shared: UGVs know all positions at once; channel.ugvs: {} would do, too"
+        yield "control.law", "asynchronous", "shared without channel.ugvs: UGVs then know all positions at once"
     if scenario.sensing is not None:
         yield "sensing", Fault(told), "left out: no theorem is about old positions with errors"
     for run, spec in scenario.runs.items():
         if METHODS[spec.method].intervention_on_top and METHODS[spec.method].intervenes:
             yield f"runs.{run}.method", spec.method, f"a or d {told}: {spec.method} puts interventions above avoidance"
         if spec.composition != "augmented":
-            yield f"runs.{run}.composition", spec.composition, f"augmented {told}: UGVs stand where it asks for it"
+            yield f"runs.{run}.composition", spec.composition, f"augmented {told}: UGVs may have to stand still"
     for name, ugv in scenario.ugvs.items():
         plant = plant_of(ugv, scenario.control.period_s)
         if plant.signals or plant.measured:
@@ -143,7 +143,7 @@ def _asynchronous(scenario: Scenario) -> Problems:
         gap = math.dist(first.target_m, second.target_m) - first.radius_m - second.radius_m
         if gap < keeps - TOLERANCE:
             why = f"at least {keeps:.9g} m from that of {one}, not {gap:.9g} m"
-            yield f"ugvs.{other}.target_m", second.target_m, f"{why}: UGVs with positions so old come no nearer"
+            yield f"ugvs.{other}.target_m", second.target_m, f"{why}: UGVs with such old positions come no closer"
 
 
 def _names(scenario: Scenario) -> Problems:
@@ -174,7 +174,7 @@ def _map(scenario: Scenario) -> Problems:
 
 
 def _shapes(scenario: Scenario) -> Problems:
-    """Each obstacle has one shape, whose corners go round it once."""
+    """Each obstacle has one shape, without crossing edges."""
     for name, obstacle in scenario.obstacles.items():
         key = f"obstacles.{name}"
         given = [shape for shape in SHAPES if getattr(obstacle, shape)]
@@ -281,7 +281,7 @@ def _route(scenario: Scenario) -> Problems:
 
 
 def _plants(scenario: Scenario) -> Problems:
-    """Plants are combined as theorems combine them, and their keys go together."""
+    """Combinations of plants have a theorem, and their keys are consistent."""
     control = scenario.control
     for name, robot in scenario.robots.items():
         flies, place = scenario.kind_of(name) == "uav", f"{scenario.key_of(name)}.plant"
@@ -310,7 +310,7 @@ def preset_s(waypoints_m: Sequence[Vector], speed_m_s: float) -> float:
 
 
 def _ends(scenario: Scenario) -> Problems:
-    """A preset must lead to its target, to within the tolerance, if a run expects the UGV there."""
+    """If a run expects a UGV at its target, the preset must end there to within the tolerance."""
     # A scenario that ends before a preset does is cut short on purpose: no arrival is expected.
     presets = [ugv.preset for ugv in scenario.ugvs.values()]
     if max(preset_s(preset.waypoints_m, preset.speed_m_s) for preset in presets) > scenario.duration_s:
@@ -388,7 +388,7 @@ def _distances(scenario: Scenario) -> Problems:
 
 
 def _and(radii: float) -> str:
-    """What radii add to a distance, m, in the words of a message."""
+    """The radii of a distance, m, as a part of a message."""
     return f" + radii {radii:.9g} m" if radii else ""
 
 
@@ -417,7 +417,7 @@ def _apart(scenario: Scenario, kind: str) -> Apart:
 
 
 def _nearest_pairs(scenario: Scenario) -> list[tuple[Apart, _Body, _Body]]:
-    """For each kind of pairs the pair that needs the most room in a period, with its safe distance."""
+    """For each kind of pair, the pair that needs the largest sensing range, with its safe distance."""
     h = scenario.control.period_s
     ugvs, uavs = (
         sorted(
@@ -439,7 +439,7 @@ def _nearest_pairs(scenario: Scenario) -> list[tuple[Apart, _Body, _Body]]:
 
 
 def _shown(number: Fraction, rounding: str) -> str:
-    """A number with nine digits, rounded in the direction in which it is allowed."""
+    """A number with nine digits, rounded so that it is allowed."""
     digits = Context(prec=9, rounding=rounding).divide(Decimal(number.numerator), Decimal(number.denominator))
     return f"{digits:.9g}"
 
@@ -462,7 +462,7 @@ def _sensing(scenario: Scenario) -> Problems:
 
 
 def _extent(scenario: Scenario) -> Problems:
-    """Rounding must not take more from a safe distance than reports tolerate."""
+    """Rounding errors of distances must stay within the tolerance of reports."""
     # With the gain A = 0 the law restores no lost distance, and no bound applies; reports say what a run lost.
     control, duration = scenario.control, scenario.duration_s
     if control.avoidance_gain_1_s == 0.0:
@@ -526,7 +526,7 @@ def _clearances(scenario: Scenario) -> Problems:
         near = list[tuple[str, str, float, Apart]]()  # a robot, what it is too near to, the gap, m, and what is needed
         for name, rows in outlines.items():
             if scenario.barriers[name].moves or (scenario.barriers[name].appears_s and attribute == "start_m"):
-                continue  # where robots are when it comes or appears is judged in each run
+                continue  # judged in each run, when it moves or appears
             needed = apart_of(scenario, name)
             for robot, point in points.items():
                 apart = convex.distances(rows, np.array(point), robot in scenario.ugvs) - rows[:, outline.RADIUS]
@@ -542,17 +542,17 @@ def _clearances(scenario: Scenario) -> Problems:
 
 
 def _standing(scenario: Scenario) -> Problems:
-    """Who is told to stand stands, and who says where it will be is there: no drift."""
-    told = ["sensing.position_error_m"] if scenario.position_error_m else []
-    told += [f"channel.ugvs.{key}" for key in ("delay_s", "loss") if getattr(scenario.ugv_links, key, 0.0)]
-    for name, robot in scenario.robots.items() if told else ():
+    """Robots without drift only, if they may have to stand still or announce positions."""
+    links = ["sensing.position_error_m"] if scenario.position_error_m else []
+    links += [f"channel.ugvs.{key}" for key in ("delay_s", "loss") if getattr(scenario.ugv_links, key, 0.0)]
+    for name, robot in scenario.robots.items() if links else ():
         if drift := plant_of(robot, scenario.control.period_s).bounds(robot.max_speed_m_s).drift_m_s:
-            allowed = f"0 with {told[0]}: {name} must stand where it is told to, and be where it says that it will be"
+            allowed = f"0 with {links[0]}: {name} must stand still when commanded to, and reach its announced positions"
             yield f"{scenario.key_of(name)}.plant.drift_m_s", drift, allowed
 
 
 def _faults(scenario: Scenario) -> Problems:
-    """What a fault exceeds is declared."""
+    """Each fault exceeds a bound that the scenario declares."""
     if (faults := scenario.faults) and faults.position_error_m and not scenario.position_error_m:
         why = "0 without sensing.position_error_m: exact positions are published"
         yield "faults.position_error_m", faults.position_error_m, why
@@ -561,26 +561,25 @@ def _faults(scenario: Scenario) -> Problems:
 
 
 def _measured(scenario: Scenario) -> Problems:
-    """The law bears the errors of measured positions: its gain is large enough."""
+    """The gain is large enough for the errors of measured positions."""
     if not (error_m := scenario.position_error_m):
         return
     key, control = "sensing.position_error_m", scenario.control
     for run, spec in scenario.runs.items():
         if spec.composition != "augmented":
-            yield f"runs.{run}.composition", spec.composition, f"augmented: robots stand where {key} asks for it"
+            yield f"runs.{run}.composition", spec.composition, f"augmented: with {key} robots may have to stand still"
     for pair in budget(scenario):
         share = decimal(control.avoidance_gain_1_s) * decimal(control.period_s)
         if share < pair.least_gain:
-            both = " (each may have to stand for the other)" if pair.second in scenario.robots else ""
+            both = " (each may have to stand still)" if pair.second in scenario.robots else ""
             why = f"{pair.promised_m:.9g} m between {pair.first} and {pair.second} with errors of {error_m:.9g} m{both}"
             needed = _shown(Fraction(pair.least_gain) / decimal(control.period_s), ROUND_CEILING)
             yield "control.avoidance_gain_1_s", control.avoidance_gain_1_s, f"at least {needed} 1/s for {why}"
 
 
 def _budget(scenario: Scenario) -> Problems:
-    """The law's distance, more than the promise where bodies are not where the law steers them, can be kept."""
-    # The steered points start and end that far from each other, the sensing range covers it, and the UAV flies above
-    # it.
+    """The larger distances of the law, for bodies off their steered points, can be kept."""
+    # Starts and targets are that far apart, the sensing range covers it, and the UAV flies above it.
     period, robots = scenario.control.period_s, scenario.robots
     if not takes_room(scenario):
         return
@@ -620,7 +619,7 @@ def _budget(scenario: Scenario) -> Problems:
 
 
 def _apart_m(scenario: Scenario, places: dict[str, Array], pair: PairBudget, outlines: dict[str, Array]) -> float:
-    """Distance of a pair when its robots are at some places, as of `PairBudget.law_m`, m."""
+    """Distance of a pair at some positions, m, comparable with `PairBudget.law_m`."""
     place = places[pair.first]
     if pair.second in places:
         return float(np.linalg.norm(place - places[pair.second]))

@@ -1,4 +1,4 @@
-"""From a scenario to what its runs leave behind: simulation, events, traces.
+"""From a scenario to the traces of its runs: simulation, events, records.
 
 Enters: a Scenario.
 Leaves: a Drake Diagram, and the Trace of a run.

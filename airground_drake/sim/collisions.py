@@ -1,4 +1,4 @@
-"""Collisions among the events of a run. No package is imported: command lines that start quickly need this."""
+"""Collisions among the events of a run; imports nothing, because quick commands use it."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

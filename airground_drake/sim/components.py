@@ -53,13 +53,13 @@ def make_law(scenario: Scenario, method: Method, composition: Composition = "aug
 
 
 def lost_at(scenario: Scenario) -> list[float]:
-    """When the UAV of each UGV is lost, s; infinite: never."""
+    """Time at which the UAV of each UGV is lost, s; infinite: never."""
     lost = {ugv: scenario.aerial[uav].lost_at_s or np.inf for uav in scenario.aerial for ugv in scenario.in_charge(uav)}
     return [lost[ugv] for ugv in scenario.ugvs]
 
 
 def repeats_after(scenario: Scenario) -> float:
-    """After how long a message is repeated to which no answer has come, s; without a channel never."""
+    """Time after which an unanswered message is repeated, s; infinite without a channel."""
     if scenario.channel is None:
         return np.inf
     down, up = make_qualities(scenario.channel)
@@ -108,7 +108,7 @@ def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:
 
 
 def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
-    """Radii of the UGVs, (n,), and distance between them, m, with which plans keep the distances of the law."""
+    """Radii of the UGVs, (n,), and distance between them, m, for plans that keep the law's distances."""
     # A UGV whose plant takes room is planned for as a larger disc.
     more, between = dict.fromkeys(scenario.ugvs, 0.0), 0.0
     budgets = budget(scenario) if takes_room(scenario) else ()
@@ -184,13 +184,13 @@ def make_rules(scenario: Scenario) -> Rules:
 
 
 def make_outlook(scenario: Scenario) -> Outlook:
-    """How far ahead outcomes are predicted."""
+    """The horizon of predicted outcomes."""
     gate = scenario.gatekeeper
     return Outlook(gate.longest_s, gate.settling_s, gate.horizon_s, scenario.arrival_tolerance_m)
 
 
 def make_patience(scenario: Scenario) -> Patience:
-    """How often and how long UGVs follow the UAV."""
+    """The limits of how often and how long UGVs follow the UAV."""
     gate = scenario.gatekeeper
     return Patience(gate.tries, gate.rest_s, gate.longest_s)
 

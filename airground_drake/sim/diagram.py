@@ -211,7 +211,7 @@ def build_model(
 
 
 def method_drawn(scenario: Scenario) -> str:
-    """Identifier of the method that pictures show: (c), the paper's Figure 2, if a run has it, else the last."""
+    """Identifier of the method to draw: (c), as in the paper's Figure 2, if a run has it, else the last."""
     # The last is that with the most parts among the scenario's runs.
     methods = {run.method for run in scenario.runs.values()}
     return "c" if "c" in methods else max(methods, key=list(METHODS).index)
@@ -294,7 +294,7 @@ def _task_planning(
 
 
 def _named(block: str, uavs: Iterable[str]) -> dict[str, str]:
-    """Names of a block or port of each UAV: that of the block, and with several UAVs of the UAV."""
+    """Names of a block or port of each UAV, with the UAV's name if there are several."""
     names = [*uavs]
     return {uav: block if len(names) == 1 else f"{block}_{uav}" for uav in names}
 
@@ -338,7 +338,7 @@ def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) ->
 
 
 def together(builder: DiagramBuilder, name: str, ports: Sequence[OutputPort]) -> OutputPort:
-    """One output port with the values of several."""
+    """One output port that stacks the values of several."""
     multiplexer = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
     for i, port in enumerate(ports):
         builder.Connect(port, multiplexer.get_input_port(i))

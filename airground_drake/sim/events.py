@@ -1,6 +1,6 @@
 """Events of a run: trigger, release, proposal, accept, refuse, over, arrival, collision.
 
-A UGV that has executed a proposal for as long as it was accepted is on its own again: `over`. It has refused nothing.
+`over` means that a UGV has completed a proposal and follows its own task again; it is not a refusal.
 """
 
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ def extract(trace: Trace) -> list[dict[str, Any]]:
 
 
 def _add_arrival(trace: Trace, robot: str, rows: int, add: Any) -> None:
-    """Add the time after which the robot stays within the arrival tolerance of its target during the first rows."""
+    """Add the time from which the robot stays within the arrival tolerance of its target, within the first rows."""
     scenario = trace.scenario
     target, tolerance_m = scenario.robots[robot].target_m, scenario.arrival_tolerance_m
     first = arrival_row(trace.position(robot)[:rows], target, tolerance_m)
@@ -66,7 +66,7 @@ def _add_arrival(trace: Trace, robot: str, rows: int, add: Any) -> None:
 
 
 def arrival_row(position: Array, target: Sequence[float], tolerance_m: float) -> int | None:
-    """The row (of T) from which on a robot, at (T, 3), m, stays that near to its target; None if there is none."""
+    """The row from which a robot at (T, 3), m, stays within the tolerance of its target; None without one."""
     away = np.linalg.norm(position - np.array(target), axis=1)
     outside = np.flatnonzero(away > tolerance_m)
     first = int(outside[-1]) + 1 if len(outside) else 0
@@ -103,7 +103,7 @@ def _nearest(trace: Trace, robot: str, body: Body, row: int) -> list[float]:
 
 
 def _way(trace: Trace, body: Body) -> PeriodMotion:
-    """Motion of a body's origin between the rows, taken as straight: (T - 1, 3), or (3,) if it never moves."""
+    """Straight motion of a body's origin between the rows: (T - 1, 3), or (3,) if it is static."""
     if body.plant is None:
         return PeriodMotion(body.start_m, body.start_m)
     position = trace.body(body.name)
@@ -117,7 +117,7 @@ def _box(way: PeriodMotion, body: Body) -> tuple[Array, Array]:
 
 
 def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> Indices:
-    """Rows, (K,), at which a centre comes within a distance of a shape; between two rows, the first of them."""
+    """Rows, (K,), at or after which a centre comes within a distance of a shape."""
     # apart: (T - 1, 3), m; shape: (k, W); within: m
     places = np.concatenate([apart.start, apart.end[-1:]])
     if len(shape) <= FEW and not any(_may_be_within(places, row, within + apart.off_m, planar) for row in shape):

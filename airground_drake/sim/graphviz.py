@@ -112,12 +112,12 @@ def _block(port: str) -> str:
 
 
 def _sort(block: str) -> str:
-    """The name of a block, without that of the UAV which has it among several."""
+    """The name of a block, without the name of its UAV."""
     return next((sort for sort in ABOARD if block.startswith(f"{sort}_")), block)
 
 
 def _node(name: str, system: System, text: str, recorded: Set[str], fed_unseen: Set[str]) -> str:
-    """Drake's text of a block, with what it does and where in place of its class."""
+    """Drake's text of a block, with its purpose and place instead of its class."""
     # Without inputs for disturbances, and without names of inputs that are fed by a hidden block.
     kind = str(getattr(system, "judges", type(system).__name__.rstrip("_")))
     aboard = ABOARD.get(_sort(name))

@@ -1,4 +1,4 @@
-"""The tables of a trace, made from a log of the diagram's outputs and from what planner and gatekeepers remember."""
+"""The tables of a trace, from a log of the diagram's outputs and the memories of planner and gatekeepers."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -37,7 +37,7 @@ from airground_drake.ugv.answer import GatekeeperDecision
 
 
 class Done(NamedTuple):
-    """What a run leaves; T rows were logged."""
+    """The results of a run; T rows were logged."""
 
     t: Array  # times, (T,), s
     logged: Mapping[str, Array]  # the signals of a trace by name, see `sim.diagram`, (k, T)
@@ -108,7 +108,7 @@ def distinct(t: Array, command: Array) -> Indices:
 def states(
     t: Array, logged: Mapping[str, Array], ugvs: Sequence[str], bodies: Sequence[str], signals: Sequence[str] = ()
 ) -> pd.DataFrame:
-    """`Trace.states` of rows at times (T,), s; what was logged of M bodies has the shape (3 M, T), of UGVs (n, T)."""
+    """`Trace.states` at times (T,), s; logs of M bodies have the shape (3 M, T), of n UGVs (n, T)."""
     # `signals` are the names of `plant_signals` and `own_headings`, (k, T).
     columns: dict[str, Array] = {"t_s": t}
     for i, body in enumerate(bodies):
@@ -143,7 +143,7 @@ def measured(states: pd.DataFrame, samples: pd.DataFrame, robots: Iterable[str])
 def samples(
     t: Array, period_s: float, logged: Mapping[str, Array], ugvs: Sequence[str], robots: Sequence[str]
 ) -> pd.DataFrame:
-    """`Trace.samples`: what was chosen at a control sample is logged from the row after it on."""
+    """`Trace.samples`; choices at a control sample are logged from the next row on."""
     at = sample_rows(t, period_s)
     chosen, reference = logged["team_command"][:, at + 1], logged["reference"][:, at]
     columns: dict[str, Array] = {"t_s": t[at]}
@@ -260,7 +260,7 @@ def _sent(memories: Iterable[PlannerState]) -> list[tuple[int, Proposal]]:
 
 
 def proposals(ugvs: Sequence[str], memories: Iterable[PlannerState]) -> pd.DataFrame:
-    """`Trace.proposals` of what planners remember."""
+    """`Trace.proposals` from the planners' memories."""
     rows = [
         (
             proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
@@ -275,7 +275,7 @@ def proposals(ugvs: Sequence[str], memories: Iterable[PlannerState]) -> pd.DataF
 
 
 def plans(memories: Mapping[str, PlannerState], ugvs: Sequence[str]) -> pd.DataFrame:
-    """`Trace.plans` of what planners remember."""
+    """`Trace.plans` from the planners' memories."""
     numbers = {(proposal.issued, ugvs[i]): proposal.number for i, proposal in _sent(memories.values())}
     rows = [
         {
@@ -301,7 +301,7 @@ def _outcome(asking: Asked) -> str:
 
 
 def messages(memories: Iterable[PlannerState], trace: Trace) -> pd.DataFrame:
-    """`Trace.messages` of a run, from what the UAVs remember, and from the decisions and samples of the trace."""
+    """`Trace.messages` of a run without a channel, from the UAVs' memories and the trace's decisions and samples."""
     rows = sorted(_messages([*memories], trace), key=lambda row: (row["sent_s"], _ORDER.index(row["kind"])))
     return typed(rows, MESSAGE_COLUMNS)
 
@@ -340,7 +340,7 @@ def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[s
 def carried(
     memories: Iterable[PlannerState], links: Sequence[tuple[Transit, Sequence[float]]], ugvs: Sequence[str]
 ) -> pd.DataFrame:
-    """`Trace.messages` of a run with a channel, from what the links carried."""
+    """`Trace.messages` of a run with a channel, from the links' records."""
     uavs = {proposal.number: proposal.sender for _, proposal in _sent([*memories])}
     rows = [
         _row(delivery.message, delivery.copy, received_s, read_s, uavs[delivery.message.about], ugvs)
@@ -351,7 +351,7 @@ def carried(
 
 
 def _deliveries(transit: Transit, read: Sequence[float]) -> Iterator[tuple[Delivery, float, float]]:
-    """What a link carried or lost; when it arrived and was read, s."""
+    """Messages that a link delivered or lost, with times of arrival and reading, s."""
     never = float("nan")
     unread = (never for _ in transit.arrived)
     for delivery, read_s in zip(transit.arrived, chain(read, unread), strict=False):

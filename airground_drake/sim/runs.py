@@ -1,7 +1,7 @@
 """Simulates the runs of a scenario in child processes; each saves its trace, which is loaded and checked here.
 
-So the routes and tasks of a scenario cannot touch the process in which verdicts are made, and the caller survives a run
-that ends its process.
+So third-party code cannot change the process in which verdicts are made, and the caller survives if a run's process
+dies.
 """
 
 import json
@@ -44,7 +44,7 @@ class _Process:
     """A run in a process of its own."""
 
     def __init__(self, scenario: Scenario, name: str, folder: Path, engine: Engine) -> None:
-        """Start it; it leaves its trace in `folder`, or a note on why there is no trace."""
+        """Start the process, which writes its trace to `folder`, or a note why there is none."""
         context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
         self._name, self._folder, self._what = name, folder, f"run {name} of {scenario.name}, seed {scenario.seed}"
         self._clock = context.RawValue("d")  # simulated time, s
@@ -103,7 +103,7 @@ def simulate_all(
 def simulate_seeds(
     scenario: Scenario, seeds: Iterable[int], jobs: int | None = None, progress: Progress = SILENT
 ) -> Iterator[Trace]:
-    """Simulate every run of a scenario with each of some seeds, by the loop, and yield each trace when it is there."""
+    """Simulate every run of a scenario with some seeds, in the loop, and yield each trace when it is finished."""
     several = [validated(replace(scenario, seed=seed)) for seed in seeds]
     work = [(scenario, name) for scenario in several for name in scenario.runs]
     return _simulated(work, f"{len(several)} more seeds", jobs, progress, engine="batch")

@@ -156,11 +156,11 @@ class Recorder:
             simulator.AdvanceTo(until)
 
     def _reported(self, context: Context) -> AbstractContextManager[None]:
-        """Errors of Drake, which raises many kinds, or a system in the body as SimulationError."""
+        """Convert any error of Drake or a system in the body to a SimulationError."""
         return raised_as(lambda error: SimulationError(self._name, context.get_time(), self._what(error)))
 
     def _what(self, error: BaseException) -> str:
-        """An error in words, with the place in the file of a user's plant or controller, and such code by name."""
+        """An error's message, with the name and line of a user's plant or controller."""
         own = self._own_code
         what = max((described(error, code.function) for code in own.values()), key=len, default=described(error))
         if not own or any(code.name in what for code in own.values()):
@@ -201,7 +201,7 @@ class Recorder:
 
 
 def carried_by(model: Model, root: Context) -> list[tuple[Transit, Sequence[float]]]:
-    """What each link of the channel carried, and when what arrived was read, s; empty without a channel."""
+    """Messages carried by each link of the channel, and times of reading, s; empty without a channel."""
     if model.links is None or model.answering is None:
         return []
     down, up = model.links
@@ -239,7 +239,7 @@ def warm_up() -> None:
 
 
 def warm_up_beside() -> None:
-    """Compile what `warm_up` needs last, and no law: in a process of its own this halves the wait for a first run."""
+    """Compile the functions that need no law, in a parallel process: this halves the wait for the first run."""
     here, there = np.zeros(3), np.array([2.0, 0.0, 0.0])
     way_left(here, there, outline.balls(0.5 * there[None]), np.ones(1))
     ways = np.ones((2, 3))

@@ -1,4 +1,4 @@
-"""The UAV's side of an intervention: who proposes which motion to which UGV.
+"""The UAV's side of an intervention: policies, plans and proposals.
 
 Enters: what the UAV sees.
 Leaves: proposals to UGVs.

@@ -9,7 +9,7 @@ Proposed = Motion | Mapping[str, Motion] | None  # what a policy returns
 
 
 class Agent(Policy):
-    """What the agent of a step-wise environment chose; nothing outside of such an environment.
+    """Proposes what the agent of a step-wise environment chose; nothing outside of such an environment.
 
     Attributes:
         chosen: answers to requests of the present planning instant, by UGV.
@@ -23,7 +23,7 @@ class Agent(Policy):
         self.requests: dict[str, Observation] = {}
 
     def propose(self, seen: Observation) -> Proposed:
-        """What was chosen for this UGV; None, and a request, if nothing was."""
+        """The motion chosen for this UGV; without a choice, None, and a request is added."""
         if seen.robot not in self.chosen:
             self.requests[seen.robot] = seen
             return None

@@ -1,7 +1,7 @@
-"""What a channel does to messages: late, lost, doubled, overtaken. Pure, and without any state but what is under way.
+"""Delay, loss, duplication and reordering of messages by a channel; the only state is messages in transit.
 
-The fate of a message is a function of the seed, the link, and the message's kind, number and attempt. So no random
-state is kept, a value may be computed twice, and a run with another delay loses the same messages.
+Delay and loss of a message are a function of the seed, the link, and the message's kind, number and attempt. So there
+is no random state, values can be recomputed, and a run with another delay loses the same messages.
 """
 
 import math
@@ -55,7 +55,7 @@ class Transit(Immutable):
 
 
 class Quality(NamedTuple):
-    """What a link does to messages."""
+    """Delay, loss and duplication of a link."""
 
     delay_s: float = 0.0
     jitter_s: float = 0.0  # a message is late by up to this, uniformly
@@ -74,7 +74,7 @@ class Link:
     name: str  # of the link; links of different names have nothing in common
 
     def carry(self, before: Transit, sent: Sequence[Message], t: float) -> Transit:
-        """The state at time t, s, when so many messages have been sent since the beginning."""
+        """The state at time t, s, given all messages sent since the beginning."""
         now = before
         if len(sent) > before.taken:
             now = self._taken(before, sent)
@@ -106,7 +106,7 @@ class Link:
         return replace(before, taken=len(sent), under_way=tuple(sorted(under_way)), lost=before.lost.plus(lost))
 
     def fate(self, message: Message) -> list[float]:
-        """By how much each copy of a message is late, s; none if it is lost."""
+        """The delay of each copy of a message, s; empty if it is lost."""
         quality, link = self.quality, f"{self.seed}/{self.name}/{message.ugv}"
         lot = random.Random(f"{link}/{message.kind}/{message.number}/{message.attempt}")
         lost, doubled, first, second = (lot.random() for _ in range(4))
@@ -119,7 +119,7 @@ class Link:
 
 
 def _is_bad(link: str, loss: float, burst_s: float, t: float) -> bool:
-    """Whether a link loses everything at time t, s: two states, each left after an exponential time (Gilbert)."""
+    """Whether a link is in an outage at time t, s: a two-state process with exponential durations (Gilbert)."""
     # No list is longer than needed, and a longer one begins like a shorter one.
     until = 256.0 * 2.0 ** max(0, math.ceil(math.log2(max(t, 1.0) / 256.0)))
     begins_bad, changes = _changes(link, loss, burst_s, until)
@@ -128,7 +128,7 @@ def _is_bad(link: str, loss: float, burst_s: float, t: float) -> bool:
 
 @lru_cache(maxsize=256)
 def _changes(link: str, loss: float, burst_s: float, until: float) -> tuple[bool, tuple[float, ...]]:
-    """Whether a link is bad at first, and when it changes, s."""
+    """Whether a link starts in an outage, and the times of its changes, s."""
     lot, t, changes = random.Random(f"{link}/bursts"), 0.0, list[float]()
     begins_bad = bad = lot.random() < loss
     while t <= until:

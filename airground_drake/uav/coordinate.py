@@ -43,7 +43,7 @@ Alone = Callable[[int], Way | None]  # the way that a UGV, given by its index in
 
 @dataclass(frozen=True)
 class Failures:
-    """What the policy remembers: requests in vain, with the reasons."""
+    """The policy's memory: failed requests, with the reasons."""
 
     # Of UGVs that had no way even alone, by name.
     shut_in: Mapping[str, tuple[Observation, str]] = field(default_factory=dict)
@@ -134,7 +134,7 @@ class Coordinate(Policy):
     def _joint(
         self, seen: Observation, space: Space, alone: Alone, effort: Effort = QUICK
     ) -> tuple[tuple[float, ...], list[int], Plan]:
-        """The best joint plan: its cost, the indices of its UGVs, and the plan."""
+        """The best joint plan, with its cost and the indices of its UGVs."""
         # effort: of each plan; with `QUICK`, the last group gets the full effort if that was not enough.
         group = self._first_group(seen)
         best: tuple[list[int], Plan] | None = None
@@ -189,7 +189,7 @@ class Coordinate(Policy):
         return plan(space, [task_of(mate, seen.start)], [self._pace(mate)], follow=self.follow).ways[0]
 
     def _pace(self, mate: Teammate) -> float:
-        """The speed at which a UGV is planned for, m/s: half of it after each motion that was too fast for it."""
+        """The planning speed of a UGV, m/s, halved after each motion that was too fast for it."""
         return min(self.speed, SHARE * mate.max_speed) / 2.0 ** min(mate.too_fast, MOST_HALVINGS)
 
     def _proposals(self, seen: Observation, group: Sequence[int], joint_plan: Plan) -> dict[str, Motion] | None:
@@ -203,7 +203,7 @@ class Coordinate(Policy):
         return motions if helped else None
 
     def _space(self, seen: Observation, clearance: float, spacing: float) -> Space:
-        """Obstacles and distances for a UGV without a body, in the plane of `seen.robot`."""
+        """Obstacles and distances for a point, in the plane of `seen.robot`."""
         keep, height = outline.keep(seen.obstacles, 0.0), float(seen.position[2])
         return Space(seen.obstacles, keep, clearance, seen.robot_distance, spacing, height)
 
@@ -216,7 +216,7 @@ def _has_the_map_of(before: Observation, seen: Observation) -> bool:
 
 
 def _stands_as_before(before: Observation, seen: Observation) -> bool:
-    """Whether a UGV stands where it stood, on the same map. If it had no way even alone, it still has no way."""
+    """Whether a UGV stands where it stood, on the same map: then a failure to find a path even alone persists."""
     # Waiting cannot open a way: with time there are fewer places at which the preset can be joined.
     return math.dist(before.position, seen.position) <= SAME_PLACE_M and _has_the_map_of(before, seen)
 
@@ -230,7 +230,7 @@ def _reason(seen: Observation, group: Sequence[int], joint_plan: Plan) -> str:
 
 
 def _is_as_before(before: Observation, seen: Observation) -> bool:
-    """Whether the map is that of an earlier observation, and every UGV is near where it was, asked for the same."""
+    """Whether map, UGV positions (roughly) and requests are those of an earlier observation."""
     return (
         _has_the_map_of(before, seen)
         and [_state(mate) for mate in before.team] == [_state(mate) for mate in seen.team]
@@ -242,7 +242,7 @@ def _is_as_before(before: Observation, seen: Observation) -> bool:
 
 
 def _state(mate: Teammate) -> tuple[object, ...]:
-    """What a plan depends on besides the UGV's position."""
+    """The inputs of a plan besides the UGV's position."""
     asked = mate.proposal and (mate.proposal.issued, mate.proposal.number)
     return mate.name, mate.triggered, mate.standing, mate.resting, mate.answered, mate.too_fast, asked
 
@@ -278,7 +278,7 @@ def predicted(mate: Teammate, start: float) -> Array:
 
 
 def _as_robot(obstacle: MovingObstacle, seen: Observation) -> OtherRobot:
-    """An obstacle that moves as a disc round it, of such a radius that robots keep its distance."""
+    """A moving obstacle as a disc, with a radius such that robots keep its distance."""
     rows = obstacle.outlines
     reach = np.hypot(*rows[:, outline.MIDDLE : outline.EXTENT].T) + rows[:, outline.EXTENT]
     radius = float((reach + obstacle.distances(0.0)).max()) - seen.robot_distance
@@ -300,7 +300,7 @@ def _is_willing(mate: Teammate, t: float) -> bool:
 
 
 def _cost(seen: Observation, group: Sequence[int], joint_plan: Plan) -> tuple[float, ...]:
-    """Cost of a plan: triggered UGVs without a way, UGVs that move, and the sum of the times to join presets, s."""
+    """Cost of a plan: triggered UGVs without a path, moving UGVs, and the sum of the times to join presets, s."""
     ways = list(zip(group, joint_plan.ways, strict=True))
     lost = sum(way is None and seen.team[i].triggered for i, way in ways)
     moved = sum(way is not None and speed(way.motion) > 0.0 for _, way in ways)

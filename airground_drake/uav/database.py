@@ -39,7 +39,7 @@ def make_policy(name: str, parameters: Mapping[str, float], budget: float = 2.0)
 
 @dataclass(frozen=True)
 class Negotiation(Immutable):
-    """What the UAV remembers of its exchange with one UGV."""
+    """The UAV's memory of its exchange with one UGV."""
 
     proposal: Proposal | None = None  # the proposal in force, or None
     turn: int = 0  # index of the policy that made the proposal, or that is asked next
@@ -54,7 +54,7 @@ class Negotiation(Immutable):
         return self.proposal is None and t >= self.retry_at
 
     def refused_lately(self, t: float) -> bool:
-        """Whether the UGV rests at time t, s, because it has refused. Then it gets no part of a joint plan either."""
+        """Whether the UGV rests after a refusal at time t, s; then it gets no part of a joint plan either."""
         return self.proposal is None and t < self.retry_at and not self.in_vain
 
 
@@ -98,7 +98,7 @@ class BehaviourDatabase:
     def after_refusal(
         self, held: Negotiation, t: float, *, learnt: bool = False, too_fast: bool = False
     ) -> Negotiation:
-        """The negotiation after the UGV has refused its proposal: after a rest it is the next policy's turn."""
+        """The negotiation after a refusal: after a rest the next policy is asked."""
         # t: s
         # learnt: whether the UAV has learnt of an obstacle with the refusal; then a ranking starts again at the best.
         # too_fast: whether the UGV refused because it would have come to rest short of its goal.
@@ -114,7 +114,7 @@ class BehaviourDatabase:
     def plan(
         self, held: Negotiation, seen: Observation, memories: dict[int, Any] | None = None
     ) -> tuple[dict[str, Negotiation], list[Asked]]:
-        """Ask the policies for the next proposal to a UGV; a joint plan brings proposals to other UGVs, too."""
+        """Ask the policies for the next proposal to a UGV; a joint plan also contains proposals to other UGVs."""
         # If no policy has a proposal, the UGV rests for `retry`, and twice as long each time in a row.
         # memories: `Policy.remembered` by index of the policy, changed in place; None: nothing is remembered.
         # Returns the negotiations that change, by UGV, and the policies that were asked.
@@ -144,7 +144,7 @@ class BehaviourDatabase:
     def _next(
         self, seen: Observation, held: Negotiation, memories: dict[int, Any]
     ) -> tuple[list[Candidate], list[Asked]]:
-        """The proposal of the first policy, from the negotiation's turn on, that has one."""
+        """The first proposal of a policy, starting at the negotiation's turn."""
         asked: list[Asked] = []
         for step in range(len(self.policies)):
             turn = (held.turn + step) % len(self.policies)
@@ -154,7 +154,7 @@ class BehaviourDatabase:
         return [], asked
 
     def _ranked(self, seen: Observation, turn: int, memories: dict[int, Any]) -> tuple[list[Candidate], list[Asked]]:
-        """All proposals from best to worst, rotated so that the proposal with the index `turn` comes first."""
+        """All proposals from best to worst, rotated so that number `turn` comes first."""
         asked: list[Asked] = []
         every = [self._ask(i, seen, asked, memories) for i in range(len(self.policies))]
         able = [(candidate, motions) for candidate, motions in zip(asked, every, strict=True) if motions]
@@ -164,7 +164,7 @@ class BehaviourDatabase:
         return ranked[first:] + ranked[:first], asked
 
     def _ask(self, index: int, seen: Observation, asked: list[Asked], memories: dict[int, Any]) -> dict[str, Motion]:
-        """What a policy proposes; adds to `asked`, and changes `memories`. Threads ask one after the other."""
+        """A policy's proposal; updates `asked` and `memories`, under a lock."""
         with self._asking:
             _, policy = self.policies[index]
             policy.remembered = memories.get(index)

@@ -100,7 +100,7 @@ class Detour(Policy):
         return path.length_m / self.speed, path
 
     def _in_the_way(self, seen: Observation) -> tuple[Array, Array]:
-        """Outlines (m, W) in the plane of the path, and the distances to keep from their cores, (m,), m."""
+        """Outlines (m, W) that block paths in the plane, and the distances to keep from their cores, (m,), m."""
         robots = [mate for mate in seen.team if mate.name != seen.robot and mate.standing and not _will_move(mate)]
         waiting = [body for body in seen.moving if not body.velocity.any()]
         stand = [outline.moved(body.outlines, body.position) for body in waiting]

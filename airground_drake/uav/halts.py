@@ -1,4 +1,4 @@
-"""Which UGVs stand still: at every instant the planner notes where and when each UGV came to a halt."""
+"""Which UGVs stand still: at every planning instant, the place and time of each UGV's last halt are updated."""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ NOT_WATCHED = -1.0  # time of the halt, s, before the first instant
 
 
 def room(max_speed: Array) -> Array:
-    """Radii of one place, (n,), m, for UGVs with these speed limits, (n,), m/s."""
+    """Radii within which UGVs with these speed limits, (n,), m/s, count as standing, (n,), m."""
     return np.minimum(STANDS_M, STANDS_SHARE * STANDS_S * max_speed)
 
 

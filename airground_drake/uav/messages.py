@@ -26,7 +26,7 @@ Outline = tuple[float, ...]  # a convex part of an obstacle, without padding: se
 
 
 class Sighting(NamedTuple):
-    """An obstacle that moves, as it was seen: its name, the place of its origin, m, and its velocity, m/s."""
+    """A sighting of a moving obstacle: its name, the position of its origin, m, and its velocity, m/s."""
 
     name: str
     place: Point
@@ -44,7 +44,7 @@ class Report(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What a UGV's answer says over a channel."""
+    """The content of a UGV's answer over a channel."""
 
     verdict: float = SILENT  # on the proposal that it is about
     report: Report = Report()
@@ -58,7 +58,7 @@ Proposals = tuple[Proposal | None, ...]  # one entry per UGV
 
 
 def sightings(world: World, t: float, positions: Array) -> list[Sighting]:
-    """The obstacles that move and are there at time t, s, with all bodies that move at positions (M, 3), m."""
+    """The moving obstacles that exist at time t, s; positions (M, 3), m, of all moving bodies."""
     seen = []
     for body, place in zip(world.moving, positions, strict=True):
         if isinstance(body.plant, Scripted) and world.there(t, [body])[0]:

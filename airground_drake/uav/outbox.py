@@ -1,4 +1,4 @@
-"""What UAVs send over a channel that may lose messages: everything until it has been read.
+"""Repetition of UAVs' messages over a channel that may lose them, until they have been read.
 
 A proposal is repeated until an answer names it or a newer one; a withdrawal, until the UGV says that it does not hold
 the proposal, or gets another one. A UAV that is lost repeats nothing.
@@ -16,7 +16,7 @@ from airground_drake.uav.planner import PlannerState
 
 @dataclass(frozen=True)
 class Outbox(Immutable):
-    """All that UAVs have sent, and what they wait for."""
+    """All messages that UAVs have sent, and the expected answers."""
 
     taken: tuple[tuple[int, int], ...] = ()  # of each UAV, proposals and withdrawals of its planner that were posted
     messages: History[Message] = field(default_factory=History)
@@ -24,7 +24,7 @@ class Outbox(Immutable):
 
 
 def posted(box: Outbox, memories: Sequence[PlannerState]) -> Outbox:
-    """With what the planners have sent since; nobody waits any more for what was said to the same UGV before."""
+    """The outbox with the planners' new messages, which replace earlier ones to the same UGV."""
     taken = tuple((len(memory.sent), len(memory.withdrawn)) for memory in memories)
     if box.taken == taken:
         return box
@@ -42,7 +42,7 @@ def posted(box: Outbox, memories: Sequence[PlannerState]) -> Outbox:
 
 
 def repeated(box: Outbox, heard: Transit, t: float, retry_s: float, left: Collection[int] = ()) -> Outbox:
-    """With what is sent again at time t, s, after `retry_s` without the answer that is waited for."""
+    """The outbox with repetitions at time t, s, of messages without an answer for `retry_s`."""
     # left: UGVs whose UAV is lost
     waiting = {
         ugv: message
@@ -68,7 +68,7 @@ def _was_read(message: Message, heard: Delivery | None) -> bool:
 
 
 def answers_heard(heard: Transit, ugvs: Iterable[int]) -> tuple[list[float], Reports]:
-    """The last answers of all UGVs that the UAV has got, as (2n,), and the reports with them."""
+    """The last received answers of all UGVs, (2n,), and their reports."""
     answers, reports = list[float](), list[Report]()
     for last in map(heard.newest.get, ugvs):
         answers += [SILENT, -1.0] if last is None else [last.message.content.verdict, float(last.message.about)]

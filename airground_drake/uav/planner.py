@@ -52,7 +52,7 @@ class Mover(NamedTuple):
 
 @dataclass(frozen=True)
 class PlannerState(Immutable):
-    """What the UAV remembers between planning periods."""
+    """The UAV's memory between planning periods."""
 
     talks: tuple[Negotiation, ...]  # negotiations, one per UGV
     learnt: tuple[Outline, ...] = ()  # obstacles at rest from UGVs' reports that are not on the map
@@ -75,14 +75,14 @@ class PlannerState(Immutable):
 
 
 class Sender(NamedTuple):
-    """A UAV, and the numbers that it gives its proposals: no other UAV gives the same."""
+    """A UAV, and the unique numbers of its proposals."""
 
     uav: str = "uav"  # name of the UAV
     first: int = 0  # its first number
     step: int = 1  # from one of its numbers to the next
 
     def number(self, count: int) -> int:
-        """The number of a proposal after so many others of this UAV."""
+        """The number of the proposal after `count` earlier ones of this UAV."""
         return self.first + self.step * count
 
 
@@ -90,7 +90,7 @@ ONLY = Sender()
 
 
 class Instant(NamedTuple):
-    """What the UAV sees and hears when it plans for n UGVs."""
+    """The UAV's observations and received messages at a planning instant, for n UGVs."""
 
     t: float  # time, s
     positions: Array  # of all robots, (r, 3), m
@@ -103,7 +103,7 @@ class Instant(NamedTuple):
 
 
 def sent_after(before: PlannerState, after: PlannerState, t: float, sender: Sender) -> PlannerState:
-    """Number the new proposals of a planning instant, and note what was sent and withdrawn; `t` in s."""
+    """Number the new proposals of a planning instant, and record messages sent and withdrawn; `t` in s."""
     # Every new proposal gets the sender, its next number and the time t, even if the planner has set others. So no
     # planner can send another motion under a number that a UGV has already answered.
     sent, talks, withdrawn = list(before.sent), list(after.talks), list(before.withdrawn)
@@ -163,7 +163,7 @@ class Planner:
         return indices
 
     def _is_on_map(self, given: Outline, there: npt.NDArray[np.bool_]) -> bool:
-        """Whether an outline is one of those on the map that are there, (m,)."""
+        """Whether each outline is on the map and exists now, (m,)."""
         return any(there[k] for k in self._rows.get(given, ()))
 
     def start(self) -> PlannerState:
@@ -176,7 +176,7 @@ class Planner:
         answers: Sequence[float] | Array | None = None,
         reports: Reports = (),
     ) -> float:
-        """Until when planning changes nothing, s, while all this stays the same; -inf: it may do so at once."""
+        """Time until which planning changes nothing with the same inputs, s; -inf: it may at once."""
         # Without a proposal in force no answer is read. Then a negotiation changes only when its rest is over, or when
         # neither its UGV nor its cause is triggered any more. A proposal stays while nobody answers, or with an
         # acceptance that was read. Answers over a channel are not given: what is read there need not be the newest.
@@ -204,15 +204,15 @@ class Planner:
 
     @cached_property
     def _comes_and_goes(self) -> bool:
-        """Whether an outline on the map is not always there: then what is unknown changes with time."""
+        """Whether an outline on the map appears or disappears."""
         return bool((np.asarray(self.mapped_from) > 0.0).any() or np.isfinite(self.mapped_until).any())
 
     def _own(self, intervening: Sequence[bool]) -> list[bool]:
-        """Which UGVs the UAV is to intervene on: those that are triggered and in its charge."""
+        """Which UGVs need an intervention of this UAV: its own triggered ones."""
         return [a and b for a, b in zip(intervening, self.charge or (True,) * len(self.ugvs), strict=True)]
 
     def lost(self, memory: PlannerState, t: float) -> PlannerState:
-        """The memory at time t, s, when the UAV is lost: no UGV holds a proposal any more whose motion is over."""
+        """The memory of a lost UAV at time t, s: proposals end with their motions."""
         over = [talk.proposal is not None and t >= talk.proposal.motion.end for talk in memory.talks]
         talks = [Negotiation() if gone else talk for gone, talk in zip(over, memory.talks, strict=True)]
         return replace(memory, talks=tuple(talks)) if any(over) else memory
@@ -242,7 +242,7 @@ class Planner:
         return self._asked(memory, now, own) if any(talk.is_due(now.t) for talk in compress(talks, own)) else memory
 
     def _asked(self, memory: PlannerState, now: Instant, own: Sequence[bool]) -> PlannerState:
-        """The memory after the policies were asked for all its own UGVs that need a proposal."""
+        """The memory after asking the policies for all its own UGVs that need a proposal."""
         t, mapped = now.t, self.mapped[self._there(now.t)]
         obstacles = outline.joined(mapped, outline.stacked(memory.learnt)) if memory.learnt else mapped
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen}
@@ -274,14 +274,14 @@ class Planner:
         return replace(memory, talks=tuple(talks), asked=tuple(asked), memories=remembered)
 
     def _there(self, t: float) -> npt.NDArray[np.bool_]:
-        """Which of the outlines on the map are there at time t, s, (m,)."""
+        """Which outlines on the map exist at time t, s, (m,)."""
         there = np.less_equal(self.mapped_from, t + SAME_S) & np.less(t + SAME_S, self.mapped_until)
         return np.broadcast_to(there, len(self.mapped))
 
     def _moving(
         self, t: float, now: Mapping[str, Sighting], latest: Mapping[str, tuple[Sighting, float]]
     ) -> tuple[MovingObstacle, ...]:
-        """The obstacles that move, as the UAV sees them at time t, s, or as UGVs last reported them."""
+        """The moving obstacles, as the UAV sees them at time t, s, or as UGVs last reported them."""
         bodies = []
         for mover in self.movers:
             sighting, when = (now.get(mover.name), t) if mover.known else latest.get(mover.name, (None, t))
@@ -322,7 +322,7 @@ class Planner:
         return after
 
     def _is_late(self, proposal: Proposal, ugv: str, t: float, place: Array) -> bool:
-        """Whether a copy of a proposal without an answer would come too late: its UGV is at a place, m."""
+        """Whether a copy of an unanswered proposal would arrive too late; `place` of its UGV in m."""
         # A copy may leave up to the next planning instant. A part of a joint plan is never late: the other UGVs have
         # theirs. A UGV that is nearer to where the motion is than to where it began has read the proposal, and its
         # answer is late or lost.

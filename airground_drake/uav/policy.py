@@ -22,7 +22,7 @@ Answered = Literal["silent", "accepted", "refused"]
 
 @dataclass(frozen=True, eq=False)
 class Teammate:
-    """What the UAV knows of one UGV.
+    """The UAV's knowledge of one UGV.
 
     Attributes:
         name: of the UGV.
@@ -60,7 +60,7 @@ class Teammate:
 
 @dataclass(frozen=True, eq=False)
 class MovingObstacle:
-    """What the UAV knows of an obstacle that moves.
+    """The UAV's knowledge of a moving obstacle.
 
     Attributes:
         name: of the obstacle.
@@ -83,7 +83,7 @@ class MovingObstacle:
 
 @dataclass(frozen=True)
 class Observation:
-    """What the UAV knows when it plans for one UGV.
+    """The UAV's knowledge when it plans for one UGV.
 
     Attributes:
         t: time, s.

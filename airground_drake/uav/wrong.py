@@ -1,4 +1,4 @@
-"""Wrong interventions, as a UAV proposes them under occlusion, noise, a stale map or malice."""
+"""Wrong interventions: by occlusion, noise, a stale map or malice."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ class Towards(Policy):
         self.speed = _positive("towards", speed_m_s)
 
     def propose(self, seen: Observation) -> Motion | None:
-        """The straight way from here, through any obstacle."""
+        """The straight path from the UGV, through any obstacle."""
         return _straight(seen, np.append(self.point, seen.position[2]), self.speed)
 
 
@@ -45,7 +45,7 @@ class Noisy(Detour):
         self.noise, self.seed = noise_m, int(seed)
 
     def propose(self, seen: Observation) -> Motion | None:
-        """The displaced detour; the same at the same time for the same seed."""
+        """The displaced detour, a function of time and seed."""
         motion = super().propose(seen)
         if motion is None:
             return None
@@ -63,7 +63,7 @@ class Hostile(Policy):
         self.speed = _positive("hostile", speed_m_s)
 
     def propose(self, seen: Observation) -> Motion | None:
-        """The straight way to the middle of the nearest obstacle or robot."""
+        """The straight path to the middle of the nearest obstacle or robot."""
         middles = seen.obstacles[:, [outline.MIDDLE, outline.MIDDLE + 1, outline.BASE]]
         around = np.concatenate([middles, seen.others])
         if not len(around):

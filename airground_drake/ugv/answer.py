@@ -36,7 +36,7 @@ class Rules:
 
 
 class Basis(NamedTuple):
-    """What a prediction rested on; empty where nothing was predicted. Obstacles are indices as in the world."""
+    """The basis of a prediction; empty without one. Obstacles are indices in the world's order."""
 
     sensed: tuple[int, ...] = ()  # obstacles within sensing range
     known: tuple[int, ...] = ()  # under method (d), obstacles sensed so far and not seen to be gone

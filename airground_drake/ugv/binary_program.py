@@ -109,14 +109,14 @@ class BinaryProgram:
         return values[live[following]][self.block]
 
     def blocked(self, plan: Array) -> Array:
-        """The mode that a plan (N,) has in most stages of each block, (B,), 0 or 1; accepting on a tie."""
+        """The majority mode of a plan (N,) in each block, (B,), 0 or 1; accepting on a tie."""
         share = self._of_block.T @ plan / self._of_block.sum(axis=0)
         return (share >= 0.5).astype(np.float64)
 
 
 @njit(cache=True)
 def _may_bind(stage: Indices, of_omega: Array, lower: Array) -> Flags:
-    """For which half-planes some plan, relaxed or not, needs more slack than for any other of the stage, and than 0."""
+    """Which half-planes can determine the slack of their stage for some plan, relaxed or not."""
     # A row asks for the slack lower - of_omega . omega, (rows,). Over omega in [0, 1] the least difference of two rows
     # is found term by term.
     kept = np.ones(len(lower), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""Limits of solving one problem: counted work in simulation, a clock in real time."""
+"""Limits of solving one problem: iteration counts in simulation, a clock in real time."""
 
 import math
 import time

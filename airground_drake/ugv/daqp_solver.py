@@ -70,7 +70,7 @@ class SolverLimits(NamedTuple):
 
 
 class Details(NamedTuple):
-    """What DAQP says besides the solution.
+    """DAQP's results besides the solution.
 
     Attributes:
         iterations: of the active-set method, over all nodes.
@@ -160,7 +160,7 @@ class Form:
 
     @cached_property
     def scaled(self) -> _Scaled:
-        """What DAQP sees of it."""
+        """The scaled problem for DAQP."""
         return _Scaled(self)
 
     def cost(self, x: Array) -> float:
@@ -202,7 +202,7 @@ class Form:
 
 
 class _Scaled:
-    """What DAQP sees of a `Form`: variables scaled to a unit diagonal of the Hessian, and only those it need see."""
+    """A `Form` scaled for DAQP to a unit diagonal of the Hessian, without variables that are solved separately."""
 
     def __init__(self, form: Form) -> None:
         self.form, diagonal, used = form, form.hessian.diagonal(), form.rows != 0.0
@@ -332,7 +332,7 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
 
     @classmethod
     def id(cls) -> SolverId:
-        """What the options of this solver are stored under."""
+        """The identifier of this solver's options."""
         return cls._ID
 
     def solver_id(self) -> SolverId:
@@ -340,11 +340,11 @@ class DaqpSolver(SolverInterface):  # type: ignore[misc]
         return self._ID
 
     def available(self) -> bool:
-        """Always: it comes with this package."""
+        """True: it comes with this package."""
         return True
 
     def enabled(self) -> bool:
-        """Always: it needs no licence."""
+        """True: it needs no licence."""
         return True
 
     def AreProgramAttributesSatisfied(self, prog: MathematicalProgram) -> bool:

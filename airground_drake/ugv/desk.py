@@ -1,8 +1,8 @@
-"""What UGVs read and answer over a channel that may lose, double and delay messages.
+"""The UGVs' side of the protocol over a channel that may lose, duplicate and delay messages.
 
-Everything may be read twice. A proposal whose number is not above the newest number read is stale; a withdrawal counts
-as read, so that its proposal is stale if it arrives later. A UGV answers every copy that it reads, also one of a
-withdrawal; it repeats a refusal and `done`, but no more than `MOST_REPEATS` times.
+Every message may be read twice. A proposal is stale if its number is not above the highest number read. A withdrawal
+counts as reading its proposal, which is stale if it arrives later. A UGV answers every copy that it reads, also one of
+a withdrawal; it repeats a refusal and `done`, but no more than `MOST_REPEATS` times.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MOST_REPEATS = 5
 
 @dataclass(frozen=True)
 class Desk(Immutable):
-    """What lies in front of n UGVs: what they have read, what they hold, what they have sent."""
+    """The protocol state of n UGVs: messages read, proposals held, answers sent."""
 
     held: Proposals  # the proposals in force, one entry per UGV
     newest: tuple[int, ...]  # the highest number of a proposal that each has read of, (n,)
@@ -32,12 +32,12 @@ class Desk(Immutable):
 
     @classmethod
     def empty(cls, count: int) -> Desk:
-        """Of `count` UGVs that have read nothing."""
+        """The initial state of `count` UGVs."""
         return cls((None,) * count, (-1,) * count, (None,) * count)
 
 
 def read(desk: Desk, arrived: Sequence[Delivery], t: float) -> Desk:
-    """After reading, at time t, s, all that arrived since."""
+    """The state after reading, at time t, s, all newly arrived messages."""
     new = arrived[len(desk.read_s) :]
     if not new:
         return desk
@@ -55,7 +55,7 @@ def read(desk: Desk, arrived: Sequence[Delivery], t: float) -> Desk:
 def replied(
     desk: Desk, asked: Collection[int], answers: Sequence[float], reports: Reports, told: int, t: float, retry_s: float
 ) -> tuple[Desk, int]:
-    """After answering at time t, s, and how many answers there are then."""
+    """The state after answering at time t, s, and the number of answers so far."""
     # asked: UGVs that have read a message at this sample. A report with a new number is a new answer to what is held.
     last, new = list(desk.last), list[Message]()
     for i, (held, newest, report, before) in enumerate(zip(desk.held, desk.newest, reports, desk.last, strict=True)):
@@ -79,7 +79,7 @@ def replied(
 
 @dataclass(frozen=True)
 class Obeying(Immutable):
-    """UGVs under method (b), which accept all that they read, when they read it."""
+    """UGVs under method (b), which accept every proposal when they read it."""
 
     desk: Desk
     reports: Reports
@@ -87,11 +87,11 @@ class Obeying(Immutable):
 
     @classmethod
     def empty(cls, count: int) -> Obeying:
-        """Of `count` UGVs that have read nothing."""
+        """The initial state of `count` UGVs."""
         return cls(Desk.empty(count), (Report(),) * count)
 
     def after(self, arrived: Sequence[Delivery]) -> Obeying:
-        """After all that arrived, each message at its time."""
+        """The state after reading each arrived message at its time."""
         now, first = self, len(self.desk.read_s)
         for k, delivery in enumerate(arrived[first:], first + 1):
             i, t, told, reports = delivery.message.ugv, delivery.received_s, now.told, list(now.reports)
@@ -106,10 +106,10 @@ class Obeying(Immutable):
 
 
 def obeyed(held: Proposals) -> list[list[float]]:
-    """The answers of UGVs that accept all that they hold, (n, 2)."""
+    """The answers of UGVs that accept every held proposal, (n, 2)."""
     return [[SILENT, -1.0] if proposal is None else [ACCEPT, float(proposal.number)] for proposal in held]
 
 
 def _repeats(last: Message, verdict: float, t: float, retry_s: float) -> bool:
-    """Whether a UGV says again, without being asked, that it does not follow the proposal that it holds."""
+    """Whether a UGV repeats, unasked, that it does not follow the proposal that it holds."""
     return verdict in (REFUSE, DONE) and last.attempt < MOST_REPEATS and t >= last.sent_s + retry_s - SAME_S

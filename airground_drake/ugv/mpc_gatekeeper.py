@@ -61,7 +61,7 @@ class GatekeeperState(Immutable):
 
     @classmethod
     def empty(cls, count: int, *, channel: bool = False) -> GatekeeperState:
-        """Of `count` UGVs that have answered nothing yet."""
+        """The initial memory of `count` UGVs."""
         held = (Commitment(),) * count
         desk = Desk.empty(count) if channel else None
         return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held, desk=desk)
@@ -80,7 +80,7 @@ class Inputs:
 
 
 class Gatekeepers(abc.ABC):
-    """The UGVs of a team, as they judge proposals, and the control law that they have, with the scenario's gains."""
+    """Gatekeepers of a team of UGVs, with their control law at the scenario's gains."""
 
     def __init__(
         self, world: World, law: UgvLaw, presets: Sequence[Motion], unreported: Collection[str] = frozenset()
@@ -102,11 +102,11 @@ class Gatekeepers(abc.ABC):
         """Judge every proposal in force, with the state from the sample before."""
 
     def asleep_until(self, proposals: Proposals, before: GatekeeperState) -> float:
-        """Until when samples only repeat the answers, s, while nothing new comes into range; -inf: one may do more."""
+        """Time until which samples only repeat answers, s, unless `wakes`; -inf: the next sample may change one."""
         return -math.inf if any(proposals) or any(before.answers[::2]) else math.inf
 
     def wakes(self, t: float, positions: Array, before: GatekeeperState) -> bool:
-        """Whether something in range at t, s, ends the sleep."""
+        """Whether an outline in range at time t, s, may change an answer."""
         return False
 
     def kept(self, times: Sequence[float], proposals: Proposals, before: GatekeeperState) -> GatekeeperState:
@@ -128,13 +128,13 @@ class Gatekeepers(abc.ABC):
     def repeated(
         self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState
     ) -> GatekeeperState | None:
-        """The state after a sample at t, s, that only repeats the answers; None: it has to be made."""
+        """The state after a sample at t, s, that only repeats the answers; None if the sample must be computed."""
         if t >= self.asleep_until(proposals, before) or self.wakes(t, positions, before):
             return None
         return self.kept([t], proposals, before)
 
     def _in_range(self, t: float, position: Array) -> Flags:
-        """Which outlines at rest are there at time t, s, and within sensing range, (m,)."""
+        """Which static outlines exist at time t, s, within sensing range, (m,)."""
         still, reach = self._world.at(self._near, t).still, self.law.avoidance.sensing_range
         return np.asarray(convex.within(still, position[None], reach, True)[0])
 
@@ -153,7 +153,7 @@ class Gatekeepers(abc.ABC):
     def _answered(
         self, now: Inputs, before: GatekeeperState, judged: Sequence[tuple[GatekeeperDecision, float]]
     ) -> GatekeeperState:
-        """The state after the decisions of a sample, with the verdicts that follow from them."""
+        """The state after the decisions of a sample, with the resulting answers."""
         n, told = len(now.proposals), before.told
         answers, reports, decisions = [SILENT, -1.0] * n, [Report()] * n, list[GatekeeperDecision]()
         for decision, verdict in judged:
@@ -173,7 +173,7 @@ class Gatekeepers(abc.ABC):
     def _news(
         self, now: Inputs, before: GatekeeperState, decision: GatekeeperDecision, verdict: float
     ) -> Report | None:
-        """The report of another answer than before, or of obstacles that the UAV does not know; else None."""
+        """The report of a changed answer, or of obstacles that the UAV does not know; else None."""
         i, told = decision.robot, before.reports[decision.robot]
         near = self._near.still[self._in_range(decision.t, now.positions[i])]
         sensed, seen = tuple(map(outline.as_tuple, near)), self._seen(now, i)
@@ -184,7 +184,7 @@ class Gatekeepers(abc.ABC):
         return Report(-1, sensed, decision.reason, in_words(decision), seen)
 
     def _seen(self, now: Inputs, i: int) -> tuple[Sighting, ...]:
-        """The obstacles that move, that a UGV senses, and that the UAV does not see."""
+        """The moving obstacles that a UGV senses and the UAV does not see."""
         if len(self._world.moving) == len(self._world.robots):
             return ()
         beside = {self._world.moving[body].name for body in self._near.carrier[self._beside(now, i)]}
@@ -192,7 +192,7 @@ class Gatekeepers(abc.ABC):
         return tuple(sighting for sighting in every if sighting.name in beside.difference(self._unreported))
 
     def _view(self, now: Inputs, i: int) -> View:
-        """All obstacles at rest and robots around a UGV, and the obstacles that move within sensing range."""
+        """All static obstacles and robots around a UGV, and the moving obstacles within sensing range."""
         near, beside, m = self._world.at(self._near, now.t), self._beside(now, i), len(self._near.still)
         shown = np.append(np.ones(m, dtype=bool), np.isin(near.others[i], beside))
         turning: dict[str, Any] = {}
@@ -263,7 +263,7 @@ class PaperGatekeepers(Gatekeepers):
         return GatekeeperDecision(now.t, i, proposal, accepted, reason, *evidence, basis=basis, cpu_s=cpu_s)
 
     def _solved(self, problem: Problem, budget: Budget) -> Solution:
-        """The route's solution; the route gets a `Problem` of its own, so that it cannot change what is recorded."""
+        """The route's solution; the route gets a copy of the `Problem`, so that it cannot change the record."""
         kind = type(self._route)
         with raised_as(lambda error: PluginError(f"route {kind.__qualname__} raised {described(error, kind.solve)}")):
             solution: object = self._route.solve(replace(problem), budget)

@@ -1,4 +1,4 @@
-"""Outcomes of accepting and of refusing a proposal: both rolled out until nothing moves any more, eq (25).
+"""Outcomes of accepting and of refusing a proposal: both rolled out until the UGV stands still, eq (25).
 
 There are two choices, now and never: follow the proposed motion until it is over and then the own task, or the own task
 all along. "Wait, then accept" is not among them: it looks cheaper at every sample, and would never accept.
@@ -35,7 +35,7 @@ MOST_CORNERS = 64  # corners among which the shortest way is looked for; it take
 
 @dataclass(frozen=True)
 class Outlook:
-    """How far the roll-outs go.
+    """Horizons and tolerances of the roll-outs.
 
     Attributes:
         longest: time that an accepted intervention may last, s.
@@ -63,11 +63,11 @@ class Outcome:
 
     @property
     def end(self) -> Array:
-        """Where it ends, (3,), m."""
+        """Its last position, (3,), m."""
         return np.asarray(self.positions[-1])
 
     def better_than(self, other: Outcome) -> bool:
-        """Whether it is better by more than `USELESS`; stalling is worse than any cost."""
+        """Whether it is better by more than `USELESS`; a stall is worse than any cost."""
         if self.stalls != other.stalls:
             return other.stalls
         return self.cost < (1.0 - USELESS) * other.cost
@@ -94,7 +94,7 @@ def outcomes(seen: View, law: UgvLaw, proposal: Proposal, look: Outlook) -> tupl
 
 
 def robot_at(seen: View, robot: int, after: Array, coasting: float, *, together: bool) -> Array:
-    """Where one of the other bodies is predicted to be at times `after` from now, (S + 1,) s: (S + 1, 3), m."""
+    """Predicted positions of another body, (S + 1, 3), m, at times `after` from now, (S + 1,), s."""
     # A robot that is asked to make a motion tracks it: its distance from the motion decays with a time constant of 1 s.
     # Any other robot keeps its velocity for `coasting`, s, then stands. The other parts of a joint plan count only if
     # this UGV accepts its own (`together`): otherwise each would refuse because the other parts free its way.
@@ -120,7 +120,7 @@ def _outcome(
 
 
 def way_left(place: Array, goal: Array, rows: Array, distances: Array) -> float:
-    """Length of the shortest way to the goal that keeps distances (m,), m, from cores (m, W), m; without, straight."""
+    """Length of the shortest path to the goal at distances (m,), m, from cores (m, W), m; straight if none exists."""
     # Among cores with more than `MOST_CORNERS` the length is that of a way on a lattice (`distance_field`), a little
     # longer: no map makes it take long.
     rows, distances = outline.sections(rows, distances, float(place[2]))

@@ -48,14 +48,14 @@ class OutcomeGatekeepers(Gatekeepers):
         self, world: World, law: UgvLaw, presets: Sequence[Motion], outlook: Outlook, patience: Patience,
         unreported: Collection[str] = frozenset(),
     ) -> None:  # fmt: skip
-        """Of the UGVs of a world: their law, their preset trajectories, how far they look and how long they wait."""
+        """Gatekeepers of a world's UGVs: law, preset trajectories, prediction horizon and patience."""
         super().__init__(world, law, presets, unreported)
         self._outlook, self._patience = outlook, patience
         self._ugvs = world.names("ugv")
         self._leaves = np.array([world.resting[k].disappears_s - 2.0 * SAME_S for k in world.owner])
 
     def asleep_until(self, proposals: Proposals, before: GatekeeperState) -> float:
-        """Until an executed proposal is over, tries count anew, or what is known is not there any more."""
+        """Until an executed proposal ends, tries are reset, or a known obstacle disappears."""
         # obstacles that move are news at every sample, unless the UAV sees them
         if any(proposals) and self._reported:
             return -math.inf
@@ -75,18 +75,18 @@ class OutcomeGatekeepers(Gatekeepers):
         return until
 
     def wakes(self, t: float, positions: Array, before: GatekeeperState) -> bool:
-        """Whether an outline is in range that is not quiet."""
+        """Whether an outline in range is not quiet."""
         still, own = self._world.at(self._near, t).still, positions[self._near.members]
         reach, quiet = self.law.avoidance.sensing_range, before.quiet
         return quiet.shape != (len(own), len(still)) or bool(news_within(still, own, reach, True, quiet))
 
     @cached_property
     def _reported(self) -> bool:
-        """Whether UGVs report obstacles that move."""
+        """Whether UGVs report moving obstacles."""
         return any(body.kind not in ROBOTS and body.name not in self._unreported for body in self._world.moving)
 
     def _quiet(self, proposals: Proposals, after: GatekeeperState) -> Flags:
-        """Which outlines in range are no news, (n, m)."""
+        """Which outlines in range are known and change no answer, (n, m)."""
         quiet = after.sensed.copy()
         for i, (proposal, report) in enumerate(zip(proposals, after.reports, strict=True)):
             rows = np.flatnonzero(quiet[i])
@@ -96,7 +96,7 @@ class OutcomeGatekeepers(Gatekeepers):
         return quiet
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
-        """Judge every new proposal by its outcome; keep to the answer to every other."""
+        """Judge every new proposal by its outcome; keep the other answers."""
         sensed = self._remembered(now.t, now.positions, before)
         known = replace(before, sensed=sensed)
         said = [answer_to(proposal, before.answers, i) for i, proposal in enumerate(now.proposals)]
@@ -119,7 +119,7 @@ class OutcomeGatekeepers(Gatekeepers):
         return replace(after, quiet=self._quiet(now.proposals, after))
 
     def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
-        """Which outlines each UGV has sensed up to time t, s, (n, m), and has not seen to be gone since."""
+        """Which outlines each UGV has sensed up to time t, s, and has not seen disappear, (n, m)."""
         # The very same array if nothing changes.
         still, own = self._world.at(self._near, t).still, positions[self._near.members]
         reach, known = self.law.avoidance.sensing_range, before.sensed
@@ -149,7 +149,7 @@ class OutcomeGatekeepers(Gatekeepers):
         standing: float,
         held: Commitment,
     ) -> GatekeeperDecision:
-        """Judge a new proposal, watch over an accepted one, keep to a refusal."""
+        """Judge a new proposal, monitor an accepted one, or keep a refusal."""
         reason: Reason = "kept"
         refuse = accept = None
         cpu_s = 0.0  # of what is foreseen: to look at the clock takes as long as to keep to an answer
@@ -173,7 +173,7 @@ class OutcomeGatekeepers(Gatekeepers):
         )
 
     def _after(self, held: Commitment, decision: GatekeeperDecision, standing: float) -> Commitment:
-        """A UGV's commitment after a decision, when its answer so far is `standing`."""
+        """A UGV's commitment after a decision; `standing` is its answer so far."""
         if decision.accepted and standing == SILENT:
             return self._patience.accept(held, decision.t, decision.proposal.motion.end)
         if standing == ACCEPT and not decision.accepted:
@@ -181,11 +181,11 @@ class OutcomeGatekeepers(Gatekeepers):
         return held
 
     def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
-        """The outcomes of refusing and of accepting, from what a UGV knows."""
+        """The outcomes of refusing and of accepting, from a UGV's knowledge."""
         return outcomes(seen, law, proposal, self._outlook)
 
     def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> tuple[View, Basis]:
-        """A UGV's knowledge: obstacles sensed or told of, bodies that move, and what the same plan asks of others."""
+        """A UGV's knowledge: sensed or reported obstacles, moving bodies, and other parts of the same joint plan."""
         around, m = self._view(now, i), len(self._near.still)
         told = self._believed(now.positions[i], known.sensed[i], proposal)
         still = outline.joined(self._near.still[known.sensed[i]], proposal.mapped[told])
@@ -223,7 +223,7 @@ class OutcomeGatekeepers(Gatekeepers):
 
 
 def _answer(decision: GatekeeperDecision, standing: float) -> float:
-    """The answer that follows from a decision; DONE stays DONE."""
+    """The answer after a decision; DONE stays DONE."""
     if decision.accepted:
         return ACCEPT
     done = decision.reason == "over" and decision.t >= decision.proposal.motion.end

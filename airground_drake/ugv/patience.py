@@ -1,4 +1,4 @@
-"""How long a UGV goes along with a UAV: the automaton of tries and rests, one per UGV.
+"""The limits of following a UAV: the automaton of tries and rests, one per UGV.
 
     ON ITS OWN  -- a proposal is accepted, tries < most -------------> EXECUTING    (a try)
     ON ITS OWN  -- on its own for `rest` s --------------------------> ON ITS OWN   (tries = 0)
@@ -44,7 +44,7 @@ class Patience:
     longest: float
 
     def rested(self, now: Commitment, t: float) -> Commitment:
-        """At time t, s: the tries count anew after a rest."""
+        """The state at time t, s: after a rest, tries are reset."""
         if now.tries and not now.executing and t >= now.since + self.rest:
             return replace(now, tries=0)
         return now
@@ -54,11 +54,11 @@ class Patience:
         return now.tries >= self.most
 
     def accept(self, now: Commitment, t: float, end: float) -> Commitment:
-        """At time t, s: a UGV on its own that is not exhausted accepts a motion that ends at `end`, s."""
+        """The state after accepting, at time t, s, a motion that ends at `end`, s (on its own, not exhausted)."""
         return replace(now, executing=True, tries=now.tries + 1, since=t, until=min(t + self.longest, end))
 
     def stop(self, now: Commitment, t: float) -> Commitment:
-        """At time t, s: the UGV is on its own again."""
+        """The state after a proposal ends at time t, s: the UGV is on its own."""
         return replace(now, executing=False, since=t)
 
     def over(self, now: Commitment, t: float) -> bool:

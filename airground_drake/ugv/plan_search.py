@@ -75,7 +75,7 @@ def beam_search(terms: Terms, block: Blocks, width: int = BEAM) -> Array:
 
 @njit(cache=True)
 def improve(terms: Terms, block: Blocks, start: Array, pairs: bool) -> tuple[Array, float]:
-    """A plan (N,), constant on blocks, that no change of one block makes cheaper, nor of two (`pairs`); its cost."""
+    """A plan (N,), constant on blocks, that is locally optimal for changes of one or (`pairs`) two blocks; its cost."""
     plan, blocks = start.copy(), block[-1] + 1
     count = len(plan) + 1
     before = _Beginnings(np.empty((count, 3)), np.empty(count), np.zeros((count, 5)), np.empty((blocks, 3)))

@@ -119,7 +119,7 @@ class Evaluation:
 
 
 def sensed(seen: View, law: UgvLaw) -> View:
-    """The view with only what is within sensing range: all that a prediction knows."""
+    """The view restricted to the sensing range, on which predictions are based."""
     return seen.restrict(seen.apart() <= law.avoidance.sensing_range)
 
 
@@ -131,10 +131,10 @@ def predicted_loop(seen: View, law: UgvLaw, proposal: Proposal, horizon: Horizon
 
 
 def predicted_problem(seen: View, law: UgvLaw, proposal: Proposal, horizon: Horizon) -> Problem:
-    """(26) for one UGV: roll out both choices and keep what it senses and might come near.
+    """(26) for one UGV: roll out both choices, with the sensed bodies that it might come near.
 
-    (26) knows points. Of a core that is no point these are, at each stage, its nearest to the refused roll-out; there
-    is no guarantee that an accepted one keeps its distance from the others.
+    (26) is about points. A core that is not a point is replaced, at each stage, by its nearest point to the refused
+    roll-out; an accepted one may come too near to other points of the core.
     """
     seen = sensed(seen, law)
     dt, stages = horizon.substeps * law.avoidance.period, np.ones(horizon.stages, dtype=np.int64)

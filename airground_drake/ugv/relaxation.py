@@ -1,4 +1,4 @@
-"""The relaxation (27) without a solver: half-planes, the box that every plan stays in, lower bounds, rounding.
+"""The relaxation (27) without a solver: half-planes, reachable boxes, lower bounds, rounding.
 
 Supporting half-planes n.(p - o) >= d - u stand for (26d): for unit n, ||p - o|| >= n.(p - o), so that they imply (26d)
 and are never optimistic. At the end of a stage any plan, relaxed or not, is in a box: between the running sums of the
@@ -14,13 +14,13 @@ from airground_drake.ugv.problem import Problem
 
 
 def nearest_in_reach(problem: Problem) -> Array:
-    """Where in the box of each stage a plan could be nearest to each point, (N, m, 3), m."""
+    """Nearest point of each stage's box to each point, (N, m, 3), m."""
     low, high = problem.boxes
     return np.clip(problem.centres, low[:, None], high[:, None])
 
 
 def within_reach(problem: Problem) -> Flags:
-    """(N, m): False where no relaxed plan can come within the safe distance, so that (26d) costs nothing there."""
+    """Whether a relaxed plan can come within the safe distance, (N, m); otherwise (26d) costs nothing."""
     squared = np.square(nearest_in_reach(problem) - problem.centres).sum(axis=2)
     within: Flags = squared < np.square(problem.distances)
     return within

@@ -1,4 +1,4 @@
-"""Predicted motion of one UGV: its control law, rolled out from what it knows, under any answers to a proposal."""
+"""Predicted motion of one UGV: a roll-out of its control law under given answers to a proposal."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class View:
         return np.concatenate([fixed, *moving])
 
     def restrict(self, sensed: npt.NDArray[np.bool_]) -> View:
-        """The same with only what is marked as sensed, (m + n,)."""
+        """This view with only the bodies marked as sensed, (m + n,)."""
         fixed, moving = sensed[: len(self.still)], sensed[len(self.still) :]
         return replace(
             self, still=self.still[fixed], parts=self.parts[moving], places=self.places[moving],
@@ -57,7 +57,7 @@ class View:
 
 
 class ClosedLoop(NamedTuple):
-    """All that the motion of one UGV over the horizon depends on, besides the answers to the proposal.
+    """The inputs of a UGV's motion over the horizon, except for the answers to the proposal.
 
     N stages of `substeps` control periods each, S = N * substeps in all. The arrays are never written to.
     """

@@ -1,4 +1,4 @@
-"""What a route returns: the plan that it found for problem (26), and the evidence."""
+"""The result of a route: its plan for problem (26), and the evidence."""
 
 from __future__ import annotations
 

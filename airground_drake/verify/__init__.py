@@ -6,12 +6,13 @@ May import: `base`, `model`, `scenario`, `sim`.
 
 `judge(trace)` judges a run from its trace alone. `judge_model(scenario)` checks the hypotheses of theorems for the
 constants of a scenario, or runs experiments. Claims about a run share no code with the controllers, the simulator and
-the optimiser that they judge. How a body moves, and what that takes of a distance, they ask its plant (`model/plants`),
-and measure it in the run; `check` has both again.
+the optimiser that they judge. They take a body's motion and its cost in distance from its plant (`model/plants`), and
+measure both in the run; `check` has separate formulas.
 
-`claim.py` defines a claim, and `base/registry.py` lists them. `pair_kinds.py` says who must keep apart from whom.
-`claims/` has the claims, each in the file of its name. `runs/` has what those about a trace share, `model/` what those
-about the model share. `engines/` computes for them and imports no claim. `proofs/` and `coq/` have the theorems.
+`claim.py` defines a claim, and `base/registry.py` lists them. `pair_kinds.py` lists the pairs that must keep apart.
+`claims/` has the claims, each in the file of its name. `runs/` has code shared by claims about a trace, `model/` code
+shared by claims about the model. `engines/` computes for them and imports no claim. `proofs/` and `coq/` have the
+theorems.
 """
 
 from importlib import import_module

@@ -1,8 +1,9 @@
-"""Four claims screened on the arrays of a run by the compiled loop, without a trace.
+"""Four claims screened on the arrays of a run of the compiled loop, without a trace.
 
-They screen and prove nothing: they give a finding without evidence, and only where the judge of a trace, `judge`, must
-come to the same. They use the geometry and the automaton that the robots use, and that judge has its own. What they
-cannot tell, or what is so near to a limit that rounding could decide, they leave to it: then a claim has no finding.
+A screen gives a finding without evidence, and only if the trace judge, `judge`, must come to the same finding. It uses
+the geometry and the automaton of the robots, whereas the trace judge has its own code. Cases that a screen cannot
+decide, or that are so near to a limit that rounding could decide, are left to the trace judge: the claim has no
+finding.
 
     SAFE-TRACE  the least distance of each pair over continuous time, straight between the rows
     ZENO-TRACE  the times of triggers
@@ -46,11 +47,11 @@ SAME = 1e-8
 
 
 class NoScreenError(Exception):
-    """Runs of this scenario are left to the judge of traces; the message says why."""
+    """Runs of this scenario need the trace judge; the message says why."""
 
 
 class ArrayJudges:
-    """Judges the runs that the loop makes of a scenario; raises NoScreenError for scenarios that it cannot judge."""
+    """Judges the loop's runs of a scenario; raises NoScreenError for scenarios that it cannot judge."""
 
     def __init__(self, batch: Batch) -> None:
         given, world = batch.given, batch.world
@@ -76,7 +77,7 @@ class ArrayJudges:
         self._rows = outline.joined(*shapes)
 
     def findings(self, log: Log, claims: Collection[str] = SCREENED) -> dict[str, Finding]:
-        """The findings on a run, by claim; claims without one are left to the judge of traces."""
+        """The findings on a run, by claim; claims without one need the trace judge."""
         if not self._is_a_run(log):
             return {}
         apart = least_of_pairs(log.bodies, self._numbers, self._rows, len(self._world.names("ugv")))
@@ -92,7 +93,7 @@ class ArrayJudges:
         return {claim: finding for claim, finding in findings.items() if finding is not None}
 
     def _is_a_run(self, log: Log) -> bool:
-        """Whether the rows are a whole run in which every robot goes where its command leads to."""
+        """Whether the rows are a whole run in which every robot follows its commands."""
         lasting, r = np.diff(log.t), len(self._world.robots)
         whole = abs(log.t[-1] - self._given.duration_s) <= TIME_TOLERANCE_S and log.t[0] == 0.0
         if not whole or lasting.min() < 0.0 or lasting.max() > self._given.control.period_s + TIME_TOLERANCE_S:
@@ -118,7 +119,7 @@ class ArrayJudges:
         return Finding(status, margin=float(gaps.min()) - bound, unit="s", exercised=len(gaps))
 
     def _thr_trig(self, log: Log) -> Finding | None:
-        """It holds, or the judge of traces has to say what is wrong."""
+        """A finding if the claim holds; otherwise the trace judge decides."""
         team, decision = self._batch.team, self._given.decision
         try:
             levels = np.array(levels_by(decision, self._batch.zeta))
@@ -184,7 +185,7 @@ def signals_of(t: Array, bodies: Array, noise: Array, corners: Corners) -> Array
 def replayed(
     t: Array, bodies: Array, noise: Array, x: Array, status: Array, corners: Corners, levels: Array
 ) -> tuple[float, int, bool]:
-    """Run the trigger again on the rows: worst lag of an event, s, -1 without any; transitions; whether all agrees."""
+    """Run the trigger again on the rows: largest lag of an event, s (-1 without events); transitions; agreement."""
     n, last = noise.shape[1], len(t) - 1
     signals = signals_of(t, bodies, noise, corners)
     own = np.array([NEW[k % FIELDS] for k in range(FIELDS * n)])

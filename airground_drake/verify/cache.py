@@ -1,9 +1,8 @@
-"""Findings of experiments about the model, kept by content: equal code and inputs give an equal finding.
+"""A cache of findings of experiments about the model: equal code and inputs give an equal finding.
 
 An entry is a file with the claim, its inputs, a digest of the code, the versions of the engines, the finding and the
-finding's SHA-256. It is used only if everything matches and the finding passes. Otherwise the claim is decided anew, so
-a damaged entry only costs time. An entry that somebody forged together with its digest is believed: see
-docs/verification.md.
+finding's SHA-256. It is used only if everything matches and the finding passes. Otherwise the claim is decided again,
+so a damaged entry only costs time. A forged entry with a matching digest is not detected: see docs/verification.md.
 """
 
 import contextlib
@@ -43,19 +42,19 @@ def cached_finding(claim: ModelClaim, inputs: dict[str, Any], folder: Path | Non
 
 
 def cache_folder() -> Path:
-    """Where findings are kept: $AIRGROUND_DRAKE_CACHE, or airground_drake in the user's cache folder."""
+    """The cache folder: $AIRGROUND_DRAKE_CACHE, or airground_drake in the user's cache folder."""
     if chosen := os.environ.get("AIRGROUND_DRAKE_CACHE"):
         return Path(chosen)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "airground_drake"
 
 
 def key(claim: ModelClaim, inputs: Mapping[str, Any]) -> str:
-    """SHA-256 of everything that a finding depends on."""
+    """SHA-256 of all inputs of a finding."""
     return files.sha256(json.dumps(content(claim, inputs), sort_keys=True, allow_nan=False).encode())
 
 
 def content(claim: ModelClaim, inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything that a finding depends on: the claim, its inputs, our code, the engines' versions."""
+    """All inputs of a finding: the claim, its constants, our code, the engines' versions."""
     return {"schema": SCHEMA, "claim": claim.id, "inputs": inputs, "code": _code(), "engines": _engines()}
 
 
@@ -76,7 +75,7 @@ def _engines() -> dict[str, str]:
 
 
 def _read(path: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding | None:
-    """The finding that was kept, if the entry is sound and about this claim."""
+    """The cached finding, if the entry is valid and about this claim."""
     try:
         entry = json.loads(files.read_bytes(path, LARGEST_BYTES))
         made, digest = entry.pop("finding"), entry.pop("sha256")
@@ -90,5 +89,5 @@ def _read(path: Path, claim: ModelClaim, inputs: Mapping[str, Any]) -> Finding |
 
 
 def _digest(finding: Mapping[str, Any]) -> str:
-    """SHA-256 of a finding, which shows bits that flipped on a disk; numbers that are not finite raise ValueError."""
+    """SHA-256 of a finding, to detect damage; non-finite numbers raise ValueError."""
     return files.sha256(json.dumps(finding, sort_keys=True, allow_nan=False).encode())

@@ -1,4 +1,4 @@
-"""The shape of a claim and of a verdict, and what any trace must be before a claim may pass on it."""
+"""Base classes of claims and verdicts, and checks that any trace must pass before it is judged."""
 
 from __future__ import annotations
 
@@ -37,30 +37,30 @@ OWN = "ugv_controller"  # among the inputs of a claim about the package's law: t
 
 
 def unjudged(kind: str) -> Finding:
-    """That a claim about the package's law says nothing of a user's controller."""
+    """The finding of a claim about the package's law for a user's controller: `not_run`."""
     why = f"the UGVs are commanded by {kind}: predictions, and proofs about the package's law, are not about it"
     return Finding("not_run", evidence={"reason": why})
 
 
 class Claim(abc.ABC):
-    """What a claim says of itself.
+    """The base class of claims, with their texts.
 
     Attributes (all of the class):
         id: stable identifier.
-        subject: what it is about, in a few words, for a report's first screen; '' for the identifier.
+        subject: a few words for a report's first screen; '' for the identifier.
         summary: one plain sentence for a reader who knows no formula; '' if the statement is plain enough.
         statement: the claim in words, precisely.
         formula: the claim as a formula, in plain text; '' if it is typeset.
         latex: the claim as a formula, typeset, a row each; () if it is in plain text.
         method: how it is decided.
         equations: equation numbers of the paper that it is about.
-        assumptions: what is taken for granted.
+        assumptions: of the claim.
         does_not_establish: what a reader must not conclude from it.
-        expected: the status that a scenario expects unless it says otherwise.
-        theorems: theorems, such as "Safety.unseen", or theories, such as "Plants", whose hypotheses it checks.
-        exercised_by: what its findings count as `exercised`, in words that follow a number; '' if they count nothing.
-        about_the_law: whether it is about the package's control law or its predictions: it is `not_run`, and that is
-            expected, where a controller of the user's own commands the UGVs.
+        expected: the status that a scenario expects by default.
+        theorems: names of theorems, such as "Safety.unseen", or theories, such as "Plants", whose hypotheses it checks.
+        exercised_by: the counted unit of `exercised`, in words that follow a number; '' without a count.
+        about_the_law: whether it is about the package's control law or its predictions; with a user's controller of the
+            UGVs it is then `not_run`, as expected.
     """
 
     id: str
@@ -79,21 +79,21 @@ class Claim(abc.ABC):
     about_the_law: bool = False
 
     def due(self, own_controller: object) -> str:
-        """The status that is expected unless the scenario says otherwise; its `ugv_controller` is None without one."""
+        """The default expected status, given the scenario's `ugv_controller`."""
         return self.expected if own_controller is None or not self.about_the_law else "not_run"
 
     def applies(self, about: Any) -> bool:
-        """Whether the claim says anything about this trace, or scenario if it is about the model; else left out."""
+        """Whether the claim applies to this trace or scenario; otherwise it is left out."""
         return True
 
     def may_apply(self, about: Any) -> bool:
-        """`applies`; a claim that cannot say is judged, which turns the exception into the status `error`."""
+        """`applies`; after an exception True, so that judging reports the error."""
         with suppress(Exception, SystemExit):
             return self.applies(about)
         return True
 
     def decided(self, find: Callable[[], Finding]) -> Finding:
-        """What `find` returns, well formed; after an exception the status `error`: the claim was not decided."""
+        """The checked result of `find`; after an exception the status `error`."""
         try:
             finding = well_formed(self, find())
             json.dumps(finding.to_json(), allow_nan=False)  # a margin that is not a number must not pass
@@ -126,14 +126,14 @@ class ModelClaim(Claim):
         """
 
     def seen_in(self, trace: Trace) -> Any:
-        """What a run shows of the claim, for `with_runs`; None, or an exception: nothing."""
+        """Data of a run for `with_runs`; None, or an exception: nothing."""
 
     def with_runs(self, finding: Finding, seen: Sequence[Any]) -> Finding:
         """The finding on the constants of some runs, with what `seen_in` returned for these runs, if not None."""
         return finding
 
     def judge_inputs(self, scenario: Scenario) -> dict[str, Any]:
-        """`inputs`; an exception, also of `applies`, becomes inputs that `judge` turns into the status `error`."""
+        """`inputs`; an exception, also in `applies`, becomes inputs for which `judge` gives the status `error`."""
         try:
             self.applies(scenario)
             own = scenario.ugv_controller
@@ -150,7 +150,7 @@ class ModelClaim(Claim):
         return self.decided(lambda: self.check(inputs))
 
     def judge_run(self, trace: Trace) -> Any:
-        """`seen_in`; None after an exception: records are missing or wrong, which claims about the run report."""
+        """`seen_in`; None after an exception, because claims about the run report faulty records."""
         with suppress(Exception, SystemExit):
             return self.seen_in(trace)
 
@@ -189,7 +189,7 @@ class TraceClaim(Claim):
 
 @dataclass(frozen=True, repr=False, kw_only=True)
 class Verdict(Finding):
-    """What was found of a claim, on a run or about the model.
+    """The finding of a claim on a run or about the model.
 
     Attributes:
         claim: the claim.
@@ -207,12 +207,12 @@ class Verdict(Finding):
     def of(
         cls, claim: Claim, run: str, finding: Finding, expected: str, inputs: dict[str, Any] | None = None
     ) -> Verdict:
-        """The finding, with what it is about."""
+        """The verdict of a finding, with the expected status."""
         values = {column.name: getattr(finding, column.name) for column in fields(Finding)}
         return cls(**values, claim=claim, run=run, expected=expected, inputs=inputs or {})
 
     def __repr__(self) -> str:
-        """In one line: which claim, on which run, what was found."""
+        """One line with claim, run and finding."""
         about = f"run {self.run!r}" if self.run else "the model"
         return f"<Verdict: {self.claim.id} on {about}: {outcome(self.status, self.exercised)}>"
 
@@ -243,7 +243,7 @@ class Verdict(Finding):
 
 
 def well_formed(claim: Claim, finding: Finding) -> Finding:
-    """The finding, its count as an `int`, once it is checked that it does not contradict itself."""
+    """The finding, checked for consistency, with its count as an `int`."""
     if finding.status not in STATUSES:
         raise ValueError(f"{claim.id} found {finding.status!r}; allowed: {', '.join(STATUSES)}")
     margin: Any = finding.margin  # of third-party code, whatever its type
@@ -266,7 +266,7 @@ def well_formed(claim: Claim, finding: Finding) -> Finding:
 
 
 def require_motion(trace: Trace) -> None:
-    """Check that each position follows from the one before and the command by the robot's plant, as the trace says."""
+    """Check that positions follow from the previous ones and the commands, by the robot's plant."""
     scenario, t = trace.scenario, trace.t
     if trace.run not in scenario.runs or scenario.runs[trace.run].method != trace.meta["method"]:
         raise TraceError(f"the scenario declares no run {trace.run!r} of method {trace.meta['method']!r}")
@@ -287,7 +287,7 @@ def require_motion(trace: Trace) -> None:
 
 
 def require_measured(trace: Trace, robot: str) -> None:
-    """Check the recorded drift and cover of a user's plant against the recorded positions, and where it begins."""
+    """Check the recorded drift and cover of a user's plant against the recorded positions, and its start."""
     t = trace.t
     samples = trace.sample_rows
     place = trace.position(robot)
@@ -328,7 +328,7 @@ def followed(trace: Trace, robot: str) -> Array:
 
 
 def _begins(trace: Trace, robot: str) -> None:
-    """Raise a TraceError where a body does not begin where the scenario says."""
+    """Raise a TraceError if a body does not begin at the scenario's start."""
     begins, start = trace.body(robot)[0], trace.scenario.robots[robot].start_m
     if np.abs(begins - start).max() > MOTION_TOLERANCE_M:
         raise TraceError(f"the body of {robot} begins at {begins.tolist()} m, not at {start}")

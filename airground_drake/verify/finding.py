@@ -1,4 +1,4 @@
-"""What a check found: a status, a margin, the evidence, a chart."""
+"""The result of a check: status, margin, evidence, chart."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -56,7 +56,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check found.
+    """The result of a check.
 
     Attributes:
         status: the verdict class.

@@ -1,4 +1,4 @@
-"""Judging every claim that is registered: on a run, or about the model of a scenario."""
+"""Judging registered claims, on a run or about the model of a scenario."""
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
@@ -99,7 +99,7 @@ def judge_all(
     claims: Collection[str] | None = None,
     progress: Progress = SILENT,
 ) -> list[Verdict]:
-    """Judge claims on runs of a scenario, and then about its model, with what the runs show of them.
+    """Judge claims on runs of a scenario, and then about its model, including the runs' evidence.
 
     Like `judge` and `judge_model`, in parallel processes.
 
@@ -173,6 +173,6 @@ def _cases(scenario: Scenario, claims: Collection[str] | None = None) -> list[_C
 def _judged(
     trace: Trace, claims: Sequence[TraceClaim], about_model: Collection[ModelClaim]
 ) -> tuple[list[Finding], dict[str, Any]]:
-    """What claims found about a run, and what it shows of claims about the model, by their identifiers."""
+    """Findings of claims about a run, and its evidence for claims about the model, by identifier."""
     seen = {claim.id: claim.judge_run(trace) for claim in about_model}
     return [claim.judge(trace) for claim in claims], seen

@@ -1,4 +1,4 @@
-"""Who must keep which distance from whom, read from the scenario alone.
+"""The pairs that must keep apart, and their distances, read from the scenario alone.
 
 SAFE-HYP compares the built controllers with the scenario.
 """
@@ -41,7 +41,7 @@ def _of_robots(scenario: Scenario, first: str, second: str) -> str:
 
 
 class Apart(NamedTuple):
-    """A robot, and a barrier or another robot that it must keep apart from, by name."""
+    """A robot, and a barrier or another robot that it must avoid, by name."""
 
     first: str  # the robot
     second: str
@@ -51,7 +51,7 @@ class Apart(NamedTuple):
 
 
 def apart(scenario: Scenario) -> Iterator[Apart]:
-    """Who must keep apart: robot by robot each barrier, and then each two robots."""
+    """All pairs: each robot with each barrier, then each two robots."""
     safe = scenario.safe_distance
     robots = scenario.robots
     for (name, robot), (other, barrier) in product(robots.items(), scenario.barriers.items()):
@@ -75,7 +75,7 @@ class PairKind(NamedTuple):
 
 
 def constants(scenario: Scenario) -> dict[str, Any]:
-    """Constants of a scenario that the claims about avoidance are about, strict JSON."""
+    """The scenario's constants for claims about avoidance, strict JSON."""
     control = scenario.control
     return {
         "avoidance_gain_1_s": control.avoidance_gain_1_s,
@@ -89,7 +89,7 @@ def constants(scenario: Scenario) -> dict[str, Any]:
 
 
 def kinds_of(inputs: dict[str, Any]) -> list[PairKind]:
-    """The pairs among a claim's inputs, as the decimals that their numbers print as."""
+    """The pairs in a claim's inputs, with numbers as exact decimals."""
     return [
         PairKind(pair["kind"], decimal(pair["distance_m"]), decimal(pair["closing_m_s"])) for pair in inputs["pairs"]
     ]

@@ -51,7 +51,7 @@ def _instance(registry: Registry, kind: type[C], name: str, place: str) -> C:
 
 
 def _unsaid(claim: Claim) -> str:
-    """What a claim does not say of itself, or says in another type than `Claim` declares; '' if it says everything."""
+    """The attribute of `Claim` that a class lacks or has with a wrong type, in words; '' if it is complete."""
     says = get_type_hints(Claim)
     if missing := [name for name in says if not hasattr(claim, name)]:
         return f"has no {missing[0]!r}; wanted: {', '.join(says)}"

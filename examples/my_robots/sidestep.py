@@ -4,7 +4,7 @@ from airground_drake import Motion, Observation, Policy
 
 
 class Sidestep(Policy):
-    """Go round what is ahead on one side, then back to the preset trajectory and to the target."""
+    """Go round the obstacle ahead on one side, then back to the preset trajectory and to the target."""
 
     def __init__(self, *, speed_m_s: float, aside_m: float = 2.9) -> None:
         """Parameters are numbers, passed by keyword from the scenario."""

@@ -40,7 +40,7 @@ AVOIDANCE = {"hypothesis": "avoidance", "margin": -0.5}
         ("not_run", {"evidence": {"reason": "no bound"}}, "no bound"),
         ("inconclusive", {}, "could not be decided"),
         ("holds", {"expected": "refuted"}, "holds all the same"),
-        ("holds", {"expected": "exercised", "exercised": 0}, "nothing put it to the test: no pairs"),
+        ("holds", {"expected": "exercised", "exercised": 0}, "not tested: no pairs"),
     ],
 )  # fmt: skip
 def test_in_words(

@@ -144,12 +144,12 @@ MISSED = judged("SAFE-HYP", status="refuted")
 FAST = judged("SAFE-HYP", evidence={"beside_moving": [{"second": "man", "too_fast_s": 3.0}]}, status="refuted")
 SHORT = judged("SAFE-TRACE", status="refuted", as_expected=False)
 KEPT = "r1\N{EN DASH}rock 0.500 ≥ 0.3 m at 3.00 s"
-UNDER_WAY = "the robots' doing, by commands already under way"
+UNDER_WAY = "caused by earlier commands of the robots"
 REPORT = "contradicts its proof: please report"
 
 SAFE: list[tuple[list[Edit], str, list[str]]] = [
     ([], "yes", ["distances kept, proved", KEPT]),
-    ([man], "yes", ["distances kept, proved but for what moves", KEPT]),
+    ([man], "yes", ["distances kept, proved except for moving obstacles", KEPT]),
     ([judged("SAFE-HYP", status="inconclusive")], "yes", ["distances kept, not proved", KEPT]),
     ([judged("SAFE-GATE", status="error")], "yes", ["distances kept, not proved", KEPT]),
     ([judged("SAFE-BUDGET", status="error")], "yes", ["distances kept, proved", KEPT]),
@@ -175,11 +175,11 @@ SAFE: list[tuple[list[Edit], str, list[str]]] = [
     ([man, gap(0.1, "man", 6.0), hit(), MISSED], "no",  # r1 counts up to 5 s
      ["collision", "r1\N{EN DASH}rock at 5.00 s"]),
     ([man, gap(0.1, "man"), met("other")], "no",
-     ["too close", "r1\N{EN DASH}man 0.100 < 0.3 m at 5.00 s", "not the robots' doing"]),
+     ["too close", "r1\N{EN DASH}man 0.100 < 0.3 m at 5.00 s", "not caused by the robots"]),
     ([man, gap(0.1, "man"), met("nobody")], "no",
-     ["too close", "r1\N{EN DASH}man 0.100 < 0.3 m at 5.00 s", "not the robots' doing"]),
+     ["too close", "r1\N{EN DASH}man 0.100 < 0.3 m at 5.00 s", "not caused by the robots"]),
     ([man, hit("man"), met("robot")], "no",
-     ["collision", "r1\N{EN DASH}man at 5.00 s", "the robots' doing", REPORT]),
+     ["collision", "r1\N{EN DASH}man at 5.00 s", "caused by the robots", REPORT]),
     ([man, hit("man"), met("under way")], "no",
      ["collision", "r1\N{EN DASH}man at 5.00 s", UNDER_WAY]),
     ([man, hit("man"), met("other"), judged("SAFE-OWN", status="refuted")], "no",
@@ -187,7 +187,7 @@ SAFE: list[tuple[list[Edit], str, list[str]]] = [
     ([man, gap(0.1, "man"), gap(0.2), met("other"), MISSED], "no",
      ["too close", "r1\N{EN DASH}man 0.100 < 0.3 m at 5.00 s", "1 more pair too close"]),  # of the rock it is not known
     ([man, hit("man"), FAST, met("other")], "no",
-     ["collision", "r1\N{EN DASH}man at 5.00 s", "not the robots' doing", "man was faster than declared"]),
+     ["collision", "r1\N{EN DASH}man at 5.00 s", "not caused by the robots", "man was faster than declared"]),
 ]  # fmt: skip
 
 
@@ -265,7 +265,7 @@ BAD = hit(), MISSED, SHORT
          [("yes", "With the UAV (d): 2 of 2 arrive, every distance kept."),
           ("no", "With the UAV (b): 1 of 2 arrive, r1 and rock collide.")]),
         ("ad", [man, hit("man"), met("other")],
-         [("no", "With or without the UAV (a, d): 1 of 2 arrive, r1 and man collide (not the robots' doing).")]),
+         [("no", "With or without the UAV (a, d): 1 of 2 arrive, r1 and man collide (not caused by the robots).")]),
         ("ad", [only("a", away(stands=True))],
          [("yes", "With the UAV (d): 2 of 2 arrive, every distance kept."),
           ("partly", "Without the UAV (a): 1 of 2 arrive, every distance kept.")]),
@@ -294,7 +294,7 @@ def test_triggers() -> None:
         judged("ZENO-TRACE", evidence={"smallest_gap": {"gap_s": 3.61}}),
     )
     assert checks("Zeno-free?") == [("yes", f"{proved}; no robot triggered twice")]
-    assert checks("Zeno-free?", gaps) == [("yes", f"{proved}; 3.61 s seen")]
+    assert checks("Zeno-free?", gaps) == [("yes", f"{proved}; least gap 3.61 s")]
     short = judged("ZENO-PROOF", inputs={"dwell_s": 0.01})
     assert checks("Zeno-free?", short)[0][0] == "partly"
     assert checks("Zeno-free?", judged("ZENO-TRACE", status="error")) == [("yes", proved)]
@@ -320,7 +320,7 @@ def test_threshold() -> None:
         ("no", "1 trigger at 0.0311 m (by (19) as printed), 1 false, 2 missed, at most 0.03 s off"),
     ]
     (above,) = checks("Threshold correct?", timed, metric("above_at_start", ["r1"]))
-    assert above[1].endswith(", r1 above it from the start")
+    assert above[1].endswith(", r1 above the threshold from the start")
     assert checks("Threshold correct?", judged("THR-TRIG", status="error"))[0][0] == "open"
 
 
@@ -346,12 +346,12 @@ def test_what_is_not_as_declared_and_what_not_to_conclude() -> None:
     over = {"status": "not_as_expected", "as_expected": 9, "differs": differs, "unpromised": [{}, {}]}
     shown = screen_of(document(man, lambda found: found["overall"].update(over), methods="abd"))
     assert shown.declared == ("no", [
-        "9 of 11 checks came out as the scenario declares",
+        "9 of 11 checks are as the scenario declares",
         "d: distances failed, d: arrival could not be checked, d: SAFE-HYP undecided",
         "2 more checks: nothing is promised",
     ])  # fmt: skip
     assert [told.partition(":")[0] for told in shown.beware] == [
-        "the UAV helps", "robots can keep away from man", "other starts or real robots end so, too",
+        "the UAV helps", "robots can keep away from man", "robots arrive from other starts or in reality",
     ]  # fmt: skip
 
 
@@ -391,7 +391,7 @@ def _require_true_row(found: Document, row: Row) -> None:
         assert row.run == "d"
         assert statuses["SAFE-HYP"] in PASSING
         assert statuses["SAFE-INV"] == statuses["SAFE-GATE"] == "proved"
-    if "not the robots' doing" in told:
+    if "not caused by the robots" in told:
         assert statuses["SAFE-OWN"] != "refuted"
 
 

@@ -9,7 +9,7 @@ from airground_drake.scenario.notes import notes
 from airground_drake.scenario.shipped import shipped
 
 SMALL = (
-    "safe_distance.obstacle_m = 2 m: values of the paper, which are large for UGVs with a radius of 0.2 m; set your own"
+    "safe_distance.obstacle_m = 2 m: the paper's values, which are large for UGVs with a radius of 0.2 m; set your own"
 )
 NARROW = {
     "ugvs.ugv1.target_m": [4, 0, 0], "ugvs.ugv1.preset.waypoints_m": [[0, 0, 0], [4, 0, 0]],
@@ -23,7 +23,7 @@ NARROW = {
         ({}, []),
         ({"ugvs.ugv1.radius_m": 0.2}, [SMALL]),
         ({"ugvs.ugv1.radius_m": 0.2, "safe_distance.obstacle_m": 0.3}, []),
-        (NARROW, [SMALL.replace("UGVs with a radius of 0.2 m", "ways within 4 m")]),
+        (NARROW, [SMALL.replace("UGVs with a radius of 0.2 m", "a field of 4 m")]),
         (
             {"ugvs.ugv1.max_speed_m_s": 60, "control.sensing_range_m": 20},
             ["ugv1 has max_speed_m_s = 60; speeds are in m/s: this is 216 km/h"],
@@ -38,7 +38,7 @@ def test_small_robots_and_worlds_with_the_papers_distances_and_great_speeds_are_
 
 @pytest.mark.parametrize(("delay_s", "gap_m", "said"), [(0.3, 8, 0), (0.6, 8, 1), (0.3, 1.5, 1), (0.6, 1.5, 2)])
 def test_ugvs_that_can_block_each_other_with_old_positions_are_noted(delay_s: float, gap_m: float, said: int) -> None:
-    """At 2 m/s and 0.05 s that is 0.7 m of the other's way, or 1.3 m; 1 m is to be kept."""
+    """At 2 m/s and 0.05 s the age of positions costs 0.7 m or 1.3 m; 1 m is to be kept."""
     changes = {"control.law": "asynchronous", "channel": {"ugvs": {"delay_s": delay_s}}}
     changes |= {
         "runs": {"d": {"method": "d"}},
@@ -47,8 +47,8 @@ def test_ugvs_that_can_block_each_other_with_old_positions_are_noted(delay_s: fl
     }
     told = [*notes(load("swap", changes))]
     assert len(told) == said
-    assert ("they can stand for ever" in "".join(told)) == (delay_s == 0.6)
-    assert ("they may only part" in "".join(told)) == (gap_m == 1.5)
+    assert ("they can block each other for ever" in "".join(told)) == (delay_s == 0.6)
+    assert ("they may only separate" in "".join(told)) == (gap_m == 1.5)
 
 
 def test_shipped_scenarios_have_no_notes_but_the_one_that_is_small() -> None:

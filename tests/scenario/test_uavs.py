@@ -49,7 +49,7 @@ def test_a_ugv_that_is_added_later_needs_a_uav() -> None:
     assert scenario.uavs["south"].ugvs == ["one"]
     scenario.uavs["west"] = Uav("west", start_m=[0.0, -3.0, 2.0])
     with pytest.raises(
-        ScenarioError, match=r"uavs\.west\.ugvs: missing; wanted: a list of UGVs.* the lists of the other UAVs have all"
+        ScenarioError, match=r"uavs\.west\.ugvs: missing; wanted: the list of its UGVs.* lists contain all"
     ):
         validated(scenario)
 
@@ -59,13 +59,13 @@ MISTAKES = [
     (of({}), "uav: missing; wanted: a mapping with start_m, or several by name in uavs"),
     (of(BOTH, safe_distance__uav_m=DELETE), "safe_distance.uav_m: missing; wanted: the distance between two UAVs"),
     (of(BOTH, uavs__south__name="kite"), "uavs.south.name: 'kite' is not allowed; south, its key, or no name"),
-    (of(BOTH, uavs__south__ugvs=["two"]), "uavs.south.ugvs.0: 'two' is not allowed; a UGV in nobody else's charge"),
-    (of(BOTH, uavs__south__ugvs=["one", "one"]), "uavs.south.ugvs.1: 'one' is not allowed; a UGV in nobody else's"),
+    (of(BOTH, uavs__south__ugvs=["two"]), "uavs.south.ugvs.0: 'two' is not allowed; a UGV of no other UAV"),
+    (of(BOTH, uavs__south__ugvs=["one", "one"]), "uavs.south.ugvs.1: 'one' is not allowed; a UGV of no other UAV"),
     (of(BOTH, uavs__south__ugvs=["three"]), "uavs.south.ugvs.0: 'three' is not allowed; one of the UGVs one, two"),
-    (of(BOTH, uavs__north__ugvs=["one", "two"]), "uavs.south.ugvs: missing; wanted: a list of UGVs that it"),
-    (of(BOTH, uavs__north__ugvs=[]), "uavs.north.ugvs: missing; wanted: a list of UGVs that it is in charge"),
-    (of({"north": NORTH}), "ugvs.one: in no UAV's charge; wanted: in uavs.north.ugvs, or one UAV without a list"),
-    (edit(SMALL_DATA, "uav.ugvs", ["one"]), "ugvs.two: in no UAV's charge; wanted: in uav.ugvs"),
+    (of(BOTH, uavs__north__ugvs=["one", "two"]), "uavs.south.ugvs: missing; wanted: the list of its UGVs"),
+    (of(BOTH, uavs__north__ugvs=[]), "uavs.north.ugvs: missing; wanted: the list of its UGVs"),
+    (of({"north": NORTH}), "ugvs.one: assigned to no UAV; wanted: in uavs.north.ugvs, or one UAV without a list"),
+    (edit(SMALL_DATA, "uav.ugvs", ["one"]), "ugvs.two: assigned to no UAV; wanted: in uav.ugvs"),
     (of(BOTH, uavs__south__start_m=[0, 3.5, 2]), "uavs.south.start_m: [0.0, 3.5, 2.0] is not allowed; south starts"),
     (of(BOTH, uavs__south__altitude_m=0.5), "uavs.south.altitude_m: 0.5 is not allowed; more than safe_distance"),
     (of({"one": NORTH, "south": SOUTH}), "ugvs.one: 'one' is not allowed; a name that no other UGV"),

@@ -1,4 +1,4 @@
-"""Where a centre is during a period, or during each of several periods."""
+"""The motion of a centre during one or several periods."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SAME_S = 1e-9  # times closer than this are one instant, s
 
 
 class PeriodMotion(NamedTuple):
-    """A centre that stays within `off_m` of a point in uniform straight motion; exact if that is 0."""
+    """A centre within `off_m` of a point in uniform straight motion; exact if `off_m` is 0."""
 
     start: Array  # position at the beginning of the period, (..., 3), m
     end: Array  # position at its end, (..., 3), m
@@ -44,7 +44,7 @@ class PeriodMotion(NamedTuple):
 
 
 def followed(plant: Plant, t_s: Array, base: Array, command: Array, samples: Collection[int], period_s: float) -> Array:
-    """The signals of a body at T rows, (T, k), that follows commands from rest, as the block of Drake has it."""
+    """Signals (T, k) at T rows of a body that follows commands from rest, as computed by the Drake block."""
     # base: (T, 3), m; command: in force up to each row, (T, 3), m/s; samples: rows at which another one is chosen
     memory, since = plant.memory(), t_s[0]
     signals = [plant.at(memory, base[0], command[0], 0.0)]

@@ -1,4 +1,4 @@
-"""All bodies of a scenario in one order, and who keeps what distance from whom."""
+"""All bodies of a scenario in one order, and the distances that they keep from each other."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -56,21 +56,21 @@ class Body:
 
     @property
     def mobility(self) -> Array:
-        """(3,): 1 in directions in which it can move, else 0."""
+        """1 in directions of possible motion, else 0, (3,)."""
         if self.plant is None:
             return np.zeros(3)
         return np.array([1.0, 1.0, 0.0]) if self.kind == "ugv" else np.ones(3)
 
     @property
     def bounds(self) -> Bounds:
-        """How far a robot may be from where the law steers it."""
+        """How far a robot's body may be from its steered point."""
         if not (self.plant and self.kind in ROBOTS):
             return AT_REST
         return self.plant.bounds(self.max_speed_m_s)._replace(error_m=self.error_m, may_stand=self.may_stand)
 
 
 class Neighbours(NamedTuple):
-    """What k robots keep away from, as arrays for compiled code: m convex parts at rest, then n parts that move.
+    """What k robots must avoid, as arrays for compiled code: m static convex parts, then n moving ones.
 
     Attributes:
         members: the robots, rows of the positions of moving bodies, (k,).
@@ -98,7 +98,7 @@ class Neighbours(NamedTuple):
 
     @classmethod
     def at_rest(cls, still: Array, max_speed: Array, radius: float = 0.0) -> Self:
-        """UGVs that keep away from outlines at rest only, (m, W), not from each other.
+        """UGVs that avoid static outlines only, (m, W), not each other.
 
         Args:
             still: the outlines, see `model.geometry.outline`.
@@ -148,7 +148,7 @@ class World:
         return tuple(body.name for body in self.bodies if not kinds or body.kind in kinds)
 
     def select(self, *kinds: Kind) -> slice:
-        """Rows of the bodies of kinds that stand side by side, in arrays of bodies."""
+        """Rows of the bodies of some adjacent kinds, in arrays of bodies."""
         rows = [i for i, body in enumerate(self.bodies) if body.kind in kinds]
         return slice(rows[0], rows[-1] + 1) if rows else slice(0, 0)
 
@@ -166,7 +166,7 @@ class World:
         return tuple(body for body in self.bodies if body.plant is not None)
 
     def at(self, near: Neighbours, t: float) -> Neighbours:
-        """Neighbours as they are at time t, s: obstacles that are not there are nowhere.
+        """The neighbours at time t, s: obstacles that do not exist then are moved far away.
 
         A controller that asks at its samples has an obstacle from the first sample at or after `appears_s` on.
         """
@@ -176,7 +176,7 @@ class World:
         return near._replace(still=outline.where(still, near.still), parts=outline.where(moving, near.parts))
 
     def there(self, t: float, bodies: Sequence[Body]) -> Flags:
-        """Which bodies are there at time t, s."""
+        """Which bodies exist at time t, s."""
         return np.array([body.appears_s <= t + SAME_S < body.disappears_s for body in bodies], dtype=np.bool_)
 
     @cached_property
@@ -217,7 +217,7 @@ class World:
 
     @cached_property
     def steering(self) -> Array | None:
-        """Numbers of the UGVs' steering, (n, 6), see `model.plants.steering`; None if all take every command."""
+        """The UGVs' steering parameters, (n, 6), see `model.plants.steering`; None if no UGV limits its commands."""
         found = [body.plant.steering if body.plant else None for body in self.bodies[self.select("ugv")]]
         if all(numbers is None for numbers in found):
             return None
@@ -225,7 +225,7 @@ class World:
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
-        """Names of what is recorded of robots that are not where the law steers them, in the order of the world."""
+        """Names of the recorded signals of robots off their steered points, in the order of the world."""
         robots = [body for body in self.moving if body.kind in ROBOTS and body.plant is not None]
         return tuple(f"{body.name}.{name}" for body in robots if body.plant for name in body.plant.signals)
 
@@ -255,12 +255,12 @@ class World:
         ]).reshape(others.shape)  # fmt: skip
         return Neighbours(
             members, carrier, others, self.still, parts, np.array(distance).reshape(len(members), -1),
-            np.hstack([np.array([self._shares(robot, self.still) for robot in robots]).reshape(len(robots), -1), share]),
+            np.hstack([np.reshape([self._shares(robot, self.still) for robot in robots], (len(robots), -1)), share]),
             _rows([robot.mobility for robot in robots]), np.array([robot.max_speed_m_s for robot in robots]),
         )  # fmt: skip
 
     def _share(self, robot: Body, other: Body) -> float:
-        """The part of an inequality that a robot takes beside a body that moves; below 0 as in `Neighbours`."""
+        """The share of the inequality that a robot takes beside a moving body; negative as in `Neighbours`."""
         if other.kind not in ROBOTS:
             return float(self._shares(robot, other.shape[:1])[0])
         unsure_m = self.unsure_s * other.max_speed_m_s if robot.kind == other.kind == "ugv" else 0.0

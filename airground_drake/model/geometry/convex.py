@@ -1,4 +1,4 @@
-"""Signed distances from convex obstacles, and what keeps clear of them: pure maths, compiled by numba.
+"""Signed distances from convex obstacles, and tests for free points and segments: pure maths, compiled by numba.
 
 Obstacles are rows of numbers, see `model.geometry.outline`. Results are those of IEEE arithmetic in the order written.
 """
@@ -123,7 +123,7 @@ def beside(rows: Array, start: Array, end: Array) -> Array:
 
 @njit(cache=True)
 def may_be_within(rows: Array, k: int, x: float, y: float, reach: float) -> bool:
-    """Whether the circle round a core comes within reach; quick, for an array of many outlines."""
+    """Whether the circle round a core comes within reach: a quick test."""
     dx, dy, limit = x - rows[k, MIDDLE], y - rows[k, MIDDLE + 1], reach + rows[k, EXTENT]
     return bool(dx * dx + dy * dy <= FAR * limit * limit)
 
@@ -141,7 +141,7 @@ def within(rows: Array, positions: Array, reach: float, planar: bool) -> Flags:
 
 @njit(cache=True)
 def news_within(rows: Array, positions: Array, reach: float, planar: bool, known: Flags) -> bool:
-    """Whether `within` would find an outline that is not known yet; `known` is (n, m)."""
+    """Whether an outline that is not yet `known`, (n, m), is within reach."""
     away = np.empty(3)
     for i in range(len(positions)):
         x, y, z = positions[i, 0], positions[i, 1], positions[i, 2]
@@ -155,7 +155,7 @@ def news_within(rows: Array, positions: Array, reach: float, planar: bool, known
 
 @njit(cache=True)
 def approach(row: Array, start: Array, end: Array, planar: bool) -> tuple[float, float]:
-    """Least signed distance of a point in straight motion from a core, m, and the share of the motion where that is."""
+    """Least signed distance of a point in straight motion from a core, m, and its share of the motion."""
     # Outside of the core the squared distance is a parabola between two of `_breaks`: three values give its least one.
     # Inside, the signed distance is convex, and the least one is found by thirds.
     # start, end: (3,), m
@@ -198,7 +198,7 @@ def approach(row: Array, start: Array, end: Array, planar: bool) -> tuple[float,
 
 @njit(cache=True)
 def _breaks(row: Array, start: Array, vx: float, vy: float, vz: float) -> Array:
-    """Shares of a straight motion between which the nearest point is on the same edge, corner or face: from 0 to 1."""
+    """Shares of a straight motion, from 0 to 1, at which the nearest feature (edge, corner, face) may change."""
     count = int(row[COUNT])
     breaks, n = np.empty(3 * count + 3), 1
     breaks[0] = 0.0
@@ -259,7 +259,7 @@ def points_are_free(points: Array, rows: Array, keep: Array) -> Flags:
 
 @njit(cache=True)
 def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack: float) -> Flags:
-    """Which segments in the plane z = 0 keep out."""
+    """Which segments in the plane z = 0 keep `keep`, m, from all cores."""
     # One with an end too near to a core must come no nearer than that end.
     # begin, end: (K, 2), m; rows: (m, W); keep: (m,), m; slack: m
     free = np.ones(len(begin), np.bool_)
@@ -283,7 +283,7 @@ def segments_are_free(begin: Array, end: Array, rows: Array, keep: Array, slack:
 
 
 class _Cells(NamedTuple):
-    """Points in square cells, to find those near an outline."""
+    """A grid of points, to find those near an outline."""
 
     # Index of the first member of each cell of each column, and the index after the last, (columns, rows + 1).
     first: npt.NDArray[np.int64]
@@ -322,7 +322,7 @@ def _cells_of(points: Array) -> _Cells:
 
 @njit(cache=True)
 def reached(row: Array, keep: float) -> tuple[float, float, float, float]:
-    """Least and greatest x, then y, within a distance, m, of a core, with a hair of room."""
+    """Bounding box (x, then y) of all points within a distance, m, of a core, slightly enlarged."""
     low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
     for k in range(int(row[COUNT])):
         x, y = row[CORNERS + 2 * k], row[CORNERS + 2 * k + 1]

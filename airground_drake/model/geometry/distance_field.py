@@ -1,8 +1,8 @@
-"""How far it is to one place from everywhere, among very many obstacles: known at the nodes of a square lattice.
+"""Path lengths from everywhere to one goal among very many obstacles, on the nodes of a square lattice.
 
-Each node knows the corner of its way that it sees next, and the length of the way from there: so lengths are those of
-ways that turn at nodes, not of ways along the lattice, and exact where the goal is in sight. Nodes are settled in the
-order of their distance; whether a node sees its corner is tested when it is settled (lazy any-angle search).
+Each node stores the next visible corner of its path, and the length from there. So paths turn at nodes but do not
+follow the lattice, and lengths are exact where the goal is visible. Nodes are settled in the order of their distance;
+whether a node sees its corner is tested when it is settled (lazy any-angle search).
 
 On maps of two real buildings lengths exceed the exact ones by 0.04 m on average and by 2 % at most; between a thousand
 rectangles with gaps hardly wider than the nodes are apart, by 3 % on average and 10 % at most. A field takes 50 ms, a
@@ -30,7 +30,7 @@ ROUNDING_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class DistanceField:
-    """Ways to one place that keep distances from obstacles in the plane z = 0."""
+    """Paths to one goal that keep distances from obstacles in the plane z = 0."""
 
     # The nodes keep at least 0.71 of their spacing from all cores, so no way leads through a thin wall. In exchange, a
     # gap may be closed that is narrower than that.

@@ -1,4 +1,4 @@
-"""`Motion.at` compiled, for controllers: `motion.py` itself is loaded by the processes of policies, without numba."""
+"""`Motion.at` compiled for controllers; `motion.py` itself must not need numba, since policies' processes load it."""
 
 import numpy as np
 

@@ -12,8 +12,8 @@ compiled code as points (m, 3) do. Outlines of one array have the same length; w
     CORNERS (2 each)         x, y of each corner, m, counter-clockwise
 
 The core is the convex hull of the corners, from BASE to TOP: a point (one corner), a wall (two), a polygon or a prism.
-A ball is a point with a radius. All geometry is about cores; `keep` says what distance from the core a robot keeps, and
-nobody else has to know radii.
+A ball is a point with a radius. All distances are computed from cores; `keep` gives the distance that a robot keeps
+from a core, including all radii.
 
 Distances are signed: inside a core they are minus the depth. The signed distance is a convex function of the point, and
 `convex.nearest` gives a subgradient n of it, a unit vector: dist(x + s v) >= dist(x) + s n.v for all v and s >= 0. The
@@ -82,7 +82,7 @@ def joined(*parts: Array) -> Array:
 
 
 def as_tuple(row: Array) -> tuple[float, ...]:
-    """An outline without padding, to be compared or sent."""
+    """An outline without padding, to compare or send it."""
     return tuple(row[: CORNERS + 2 * int(row[COUNT])].tolist())
 
 
@@ -102,7 +102,7 @@ def is_among(one: Array, other: Array) -> Flags:
 
 
 def are_outlines(rows: Array) -> Flags:
-    """Which rows (m, W) are outlines of convex cores, (m,); others may come from a stranger."""
+    """Which rows (m, W) of untrusted data are outlines of convex cores, (m,)."""
     if rows.ndim != 2 or rows.shape[1] < CORNERS + 2:
         return np.zeros(len(rows), dtype=bool)
     count = rows[:, COUNT]
@@ -135,7 +135,7 @@ def keep(rows: Array, radius: float) -> Array:
 
 
 def box(rows: Array) -> tuple[Array, Array]:
-    """Two opposite corners, (3,), m, of a box round all that outlines (m, W) stand for."""
+    """Two opposite corners, (3,), m, of the bounding box of outlines (m, W)."""
     reach, middle = rows[:, EXTENT] + rows[:, RADIUS], rows[:, MIDDLE:EXTENT]
     low = np.column_stack([middle - reach[:, None], rows[:, BASE] - rows[:, RADIUS]])
     high = np.column_stack([middle + reach[:, None], rows[:, TOP] + rows[:, RADIUS]])
@@ -155,7 +155,7 @@ def moved(rows: Array, by: Array) -> Array:
 
 
 def where(there: Flags, rows: Array) -> Array:
-    """Outlines (m, W), with a point at NOWHERE_M in place of each that is not there; `there` is (m,)."""
+    """Outlines (m, W), with those that do not exist (`there`, (m,)) replaced by a point at NOWHERE_M."""
     nowhere = np.zeros(rows.shape[1])
     nowhere[: CORNERS + 2] = balls(np.full(3, NOWHERE_M))[0]
     return np.where(there[:, None], rows, nowhere)
@@ -174,7 +174,7 @@ def sections(rows: Array, distance: Array | float, height: float) -> tuple[Array
 
 
 def rim(row: Array, distance: float, rays: int = 16) -> Array:
-    """The boundary of all that is within a distance, m, of a core in the plane, as a polygon (K, 2), m, to be drawn."""
+    """The outline of all points within a distance, m, of a core in the plane, as a polygon (K, 2), m, for drawing."""
     corners = corners_of(row)
     if len(corners) == 1:
         turn = np.linspace(0.0, 2.0 * np.pi, 4 * rays, endpoint=False)

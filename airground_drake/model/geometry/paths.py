@@ -155,7 +155,7 @@ def _need_finite(*given: ArrayLike) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Obstacles:
-    """What a path keeps out of."""
+    """The sets that a path must not enter."""
 
     rows: Array  # outlines at height 0, (m, W): discs, then walls and polygons
     keep: Array  # distances from their cores, (m,), m
@@ -227,7 +227,7 @@ class _Obstacles:
         return ~convex.arcs_are_covered(_places(c), r, begin, sweep, self.rows, self.keep - 2.0 * TOL)
 
     def lack(self, point: complex) -> str | None:
-        """Words for the first obstacle that a point is nearer to than allowed, by more than TOL; or None."""
+        """A description of the first obstacle that is too near to a point by more than TOL; or None."""
         inside = np.flatnonzero(self.distances(point) < self.keep - TOL)
         if not len(inside):
             return None
@@ -244,16 +244,16 @@ class _Obstacles:
         return apart
 
     def shrunk(self, point: complex) -> Self:
-        """These obstacles, but with a point that is up to TOL inside on the boundary."""
+        """These obstacles, shrunk so that a point up to TOL inside is on the boundary."""
         far = self.distances(point)
         return self if (self.keep <= far).all() else replace(self, keep=np.minimum(self.keep, far))
 
     def some(self, which: Flags) -> Self:
-        """Some of them, (m,)."""
+        """The obstacles selected by a mask, (m,)."""
         return replace(self, rows=self.rows[which], keep=self.keep[which])
 
     def clear(self, points: Points) -> Flags:
-        """Which points, (n,), are outside everything; (n,)."""
+        """Which points, (n,), are outside all obstacles; (n,)."""
         return convex.points_are_free(_places(points), self.rows, self.keep - _EPS)
 
     def passable(self, a: Points, b: Points) -> Flags:
@@ -261,7 +261,7 @@ class _Obstacles:
         return convex.ways_are_clear(_places(a), _places(b), self.rows, self.keep - _EPS)
 
     def entered(self, pieces: Array) -> Flags:
-        """Which of them pieces of a path (see ``Path``) run into, polygons also nearly; (m,)."""
+        """Which obstacles the pieces of a path (see ``Path``) enter, or for polygons nearly enter; (m,)."""
         discs = _entered(pieces, _middles(self.rows[: self.first]), self.keep[: self.first])
         begin, end, sagitta = _chords(pieces)
         rows, keep = self.rows[self.first :], self.keep[self.first :]
@@ -380,7 +380,7 @@ _TURNS = np.array([1.0, -1.0, 1.0, -1.0])
 
 @lru_cache(maxsize=16)
 def _pairs(count: int) -> tuple[Indices, Indices]:
-    """Both members of all pairs of so many things; nothing writes to them."""
+    """Indices of both members of all pairs of `count` items, read-only."""
     i, j = np.triu_indices(count, 1)
     return i, j
 
@@ -413,7 +413,7 @@ def _rows(begin: Points, heading: Points, curvature: Array, length: Array) -> Ar
 
 
 def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
-    """The pieces of the shortest path; a shortest path among some that runs into none of the others is shortest."""
+    """The pieces of the shortest path: one among some obstacles is shortest if it enters none of the others."""
     if len(around.circles[1]) <= FEW:
         return _route(p, q, around)
     some = around.entered(_rows(np.array([p]), np.array([q - p]), np.zeros(1), np.array([abs(q - p)])))
@@ -434,7 +434,7 @@ def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
 
 
 def _entered(pieces: Array, c: Points, r: Array) -> Flags:
-    """Which discs pieces of a path (see ``Path``) run into; shape (m,)."""
+    """Which discs the pieces of a path (see ``Path``) enter, (m,)."""
     x, y, tx, ty, curvature, length = pieces.T[:, :, None]
     begin, heading, bent = x + 1j * y, tx + 1j * ty, curvature != 0.0
     along = np.clip(((c - begin) * heading.conj()).real, 0.0, length)

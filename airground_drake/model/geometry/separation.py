@@ -90,7 +90,7 @@ def _crosses(x: float, y: float, u: float, v: float, p: Array, q: Array) -> bool
 
 @njit(cache=True)
 def _between(one: Array, other: Array, share: float) -> tuple[float, float, float]:
-    """Distance of two cores, m, 0 if they meet, and a place on the shortest way from one to the other, at a share."""
+    """Distance of two cores, m, 0 if they meet, and a point at a share of the shortest connection."""
     best, x, y = np.inf, 0.0, 0.0
     away = np.empty(3)
     for turn in range(2):

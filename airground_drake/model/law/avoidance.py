@@ -13,10 +13,10 @@ satisfies all of them, so a safe choice always exists.
 Beside an obstacle that may move at a speed V the robot does nothing that would bring it too near by itself:
 
     n.v >= -(D - d - V h) / h  if D >= d + V h: whatever the obstacle does, d is kept in this period;
-    n.v >= 0                   otherwise: what is lost below min(D, d + V h), the obstacle has moved itself.
+    n.v >= 0                   otherwise: any loss below min(D, d + V h) is due to the obstacle's motion.
 
-Two UGVs that act on old positions of each other (`control.law: asynchronous`) share nothing. With rho the way that the
-other one can have gone from its old position until it decides again, D away,
+Two UGVs that act on old positions of each other (`control.law: asynchronous`) do not share an inequality. With rho the
+distance that the other one can drive from its old position, D away, until it decides again,
 
     n.v >= -(D - d - rho) / h  if D >= d + rho;
     D n.v >= rho ||v||         otherwise: away from every place where it can be. In the plane these are two half-planes.
@@ -90,13 +90,13 @@ class Avoidance:
 
     @property
     def layer(self) -> kernels.Layer:
-        """The numbers as the kernels take them."""
+        """The parameters for the kernels."""
         stands = self.stands and self.composition == "augmented"
         code = kernels.STANDING if stands else _CODES[self.composition]
         return kernels.Layer(float(self.gain), float(self.period), float(self.sensing_range), code)
 
     def half_spaces(self, positions: Array, near: Neighbours) -> HalfSpaces:
-        """Constraints of k robots when all bodies that move are at positions (M, 3) m."""
+        """Constraints of k robots with the moving bodies at positions (M, 3) m."""
         if (near.share < 0.0).any():
             raise ValueError("positions that are not sure ask for two constraints; wanted: sure ones")
         count = near.distance.shape[1]

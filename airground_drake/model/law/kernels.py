@@ -1,4 +1,4 @@
-"""Compiled inner loops of set-based avoidance (7)-(8) (numba); `avoidance.py` explains and wraps them.
+"""Compiled inner loops of set-based avoidance (7)-(8) (numba); see `avoidance.py` for the maths.
 
 Scalar code without temporaries, because the gatekeeper computes the command of hundreds of thousands of periods, and
 numba compiles an expression of whole arrays several times as long as a loop. No fast-math: results are those of IEEE
@@ -145,8 +145,8 @@ def _lead_away(
 def avoid_one(lower: Array, normal: Array, bound: Array, composition: int, max_speed: float = np.inf) -> Array:
     """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`, composed by (5) or as `Avoidance` says.
 
-    A `lower` that is not finite asks for nothing. Who stands where constraints contradict one another stands, too,
-    where only more than `max_speed`, m/s, would meet them.
+    A non-finite `lower` counts as 0. With the composition `STANDING`, a robot also stands if only velocities above
+    `max_speed`, m/s, meet the constraints.
     """
     if not is_finite(lower):
         lower = np.zeros(3)
@@ -204,7 +204,7 @@ def yielding(task: Array, normal: Array, retreat: Array, max_speed: float) -> Ar
 
 @njit(cache=True)
 def _recursion(lower: Array, normal: Array, bound: Array, nearest_first: bool) -> Array:
-    """(5) as printed, from the lowest priority to the highest: each task sees only the level below it."""
+    """(5) as printed, from the lowest priority to the highest: each projection takes only the next lower level."""
     count = len(bound)
     done = np.zeros(count, dtype=np.bool_)
     velocity = lower.copy()
@@ -270,7 +270,7 @@ def is_finite(velocity: Array) -> bool:
 
 @njit(cache=True)
 def _raised(bound: Array, by: float) -> Array:
-    """All bounds, higher by so much, m/s."""
+    """All bounds, raised by an amount, m/s."""
     raised = np.empty(len(bound))
     for k in range(len(bound)):
         raised[k] = bound[k] + by
@@ -292,7 +292,7 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
-    """Slowest velocity whose largest violation is least, up to `ABOVE_LEAST` and `ABOVE_LEAST_M_S`."""
+    """Slowest velocity with the least maximum violation, up to `ABOVE_LEAST` and `ABOVE_LEAST_M_S`."""
     # Constraints contradict each other only where a robot is inside several safe distances at once. The wishes of lower
     # priorities then have no say: they might be hostile. The least violation is found from below: each contradiction
     # proves that every velocity misses some constraint by a certain amount, and the bounds are lowered by that.
@@ -307,7 +307,7 @@ def _least_violation(normal: Array, bound: Array) -> Array:
 
 @njit(cache=True)
 def _closest(lower: Array, normal: Array, bound: Array, contradiction: float) -> tuple[Array, float]:
-    """Closest velocity to `lower` (d,) with normal (K, d) . v >= bound (K,), and the violation that is certain, m/s."""
+    """Closest velocity to `lower` (d,) with normal (K, d) . v >= bound (K,), and the unavoidable violation, m/s."""
     # The dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983) in d dimensions. The
     # velocity is always the closest one under the active constraints; each of these pushes with a force >= 0. The
     # constraint that is missed most joins them; a constraint whose force falls to 0 on the way leaves.
@@ -403,7 +403,7 @@ def _first_release(force: Array, share: Array, pull: Array, size: int) -> tuple[
 
 @njit(cache=True)
 def _certain_violation(bound: Array, p: int, pull: Array, active: npt.NDArray[np.int64]) -> float:
-    """Every velocity misses p or an active constraint by this, m/s: no velocity changes this mean of their misses."""
+    """Unavoidable violation of p or an active constraint, m/s: a weighted mean that is the same for all velocities."""
     weight, total = 1.0, bound[p]
     for m in range(len(active)):
         weight -= pull[m]
@@ -415,7 +415,7 @@ def _certain_violation(bound: Array, p: int, pull: Array, active: npt.NDArray[np
 def _remove(
     leaving: int, normal: Array, active: npt.NDArray[np.int64], force: Array, across: Array, share: Array
 ) -> None:
-    """Close the gap that an active constraint leaves, in the forces, too, and split the normals behind it again."""
+    """Remove an active constraint and its force, and orthogonalise the normals after it again."""
     for m in range(leaving, len(active)):
         force[m] = force[m + 1]
     for m in range(leaving, len(active) - 1):
@@ -425,7 +425,7 @@ def _remove(
 
 @njit(cache=True)
 def _split(vector: Array, across: Array, share: Array, k: int) -> None:
-    """Write the part of a vector that is orthogonal to across[:k] into across[k], and into share[k, :k] its shares."""
+    """Orthogonalise a vector against across[:k] into across[k]; its coefficients go into share[k, :k]."""
     # Gram-Schmidt, twice: of nearly parallel vectors, one pass leaves a part along the others as large as the rest.
     for a in range(len(vector)):
         across[k, a] = vector[a]
@@ -444,7 +444,7 @@ def _split(vector: Array, across: Array, share: Array, k: int) -> None:
 
 @njit(cache=True)
 def _meet(velocity: Array, normal: Array, bound: Array, active: npt.NDArray[np.int64], across: Array) -> None:
-    """Take a velocity, in place, the shortest way to where the active constraints hold with equality."""
+    """Project a velocity, in place, onto the active constraints with equality."""
     # Twice: with nearly parallel normals the first pass misses by the rounding error over the sine of their angle,
     # which is too much. The second pass starts beside the goal and misses by the rounding error only.
     for _ in range(2):

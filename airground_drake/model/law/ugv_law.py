@@ -32,7 +32,7 @@ class AcceptedMotion(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The numbers of `UgvLaw`, as numba takes them."""
+    """The parameters of `UgvLaw` for numba."""
 
     motion_gain: float
     intervention_gain: float
@@ -49,7 +49,7 @@ class UgvState(NamedTuple):
 
 
 class Tracking(NamedTuple):
-    """A UGV's own task (6): where it is to be, (3,), m, and the velocity of that place, (3,), m/s."""
+    """A UGV's own task (6): desired position, (3,), m, and its velocity, (3,), m/s."""
 
     target: Array
     rate: Array

@@ -1,1 +1,1 @@
-"""Plants of robots: where the body is between samples, and what that costs in distance."""
+"""Plants of robots: the body's motion between samples, and its cost in distance."""

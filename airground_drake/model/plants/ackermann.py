@@ -19,11 +19,11 @@ _LOCK = wanted("an angle in rad above 0 and below pi / 2 = 1.5708", ge=SMALLEST,
 
 @dataclass(slots=True, kw_only=True)
 class AckermannKeys(Keys):
-    """A car (UGVs), steered by a hand point ahead of its rear axle. It never drives backwards, nor turns on the spot.
+    """A car (UGVs) with a hand point ahead of its rear axle. It never drives backwards or turns on the spot.
 
-    Commands must lead ahead, within atan(hand_point_m / R) of the heading, R = wheelbase_m / tan(max_steering_rad) its
-    least turning radius: the law takes that as two more inequalities. A car whose target is aside or behind, nearer
-    than it can turn, stands for ever.
+    Commands must point ahead, within atan(hand_point_m / R) of the heading. Here R = wheelbase_m /
+    tan(max_steering_rad) is its least turning radius; the law has two more inequalities for this. A car whose target is
+    beside or behind it, closer than it can turn, stands for ever.
     """
 
     kind: Literal["ackermann"]

@@ -1,25 +1,26 @@
-"""What distance the law keeps so that the bodies keep the distance promised (the distance budget).
+"""The distance budget: the distance that the law must keep so that the bodies keep the promised distance.
 
-The law steers a point. The theorems of `verify/coq/` (Budget, Plants, Pieces, Passive) say how far a body may be
-from it, and what that costs. For two bodies that keep d, with the bounds of `Bounds` and the gain A of the law,
+The law steers a point. The theorems of `verify/coq/` (Budget, Plants, Pieces, Passive) bound the distance of the body
+from this point, and the cost in distance. For two bodies that keep d, with `Bounds` and the gain A of the law,
 
     d_law = d + b + covers + dips + (drift_i + drift_j) / A,
 
-where b is what delays and lags cost. With V the slower speed limit, V_rel the sum of both, and any tau >= 0,
+where b is the cost of delays and lags. With V the slower speed limit, V_rel the sum of both, and any tau >= 0,
 
     delay   d' = d + V |delta_i - delta_j|
     lag     d' + b = |tau_i - tau| V_i + |tau_j - tau| V_j + sqrt(d'^2 + (tau V_rel)^2).
 
-Beside a set at rest a delay costs nothing and a lag sqrt(d^2 + (tau V)^2) - d. Beside an obstacle that may move the law
-only promises that the robot does not come nearer by itself. There lag and delay count as covers, tau V and delta V.
+Beside a static set a delay costs nothing and a lag sqrt(d^2 + (tau V)^2) - d. Beside an obstacle that may move the law
+only promises that the robot does not come nearer by its own motion; there lag and delay count as covers, tau V and
+delta V.
 
-Where the law acts on measured positions, off by e_i and e_j at most, e = e_i + e_j and (theorem Budget.budget_always)
+If the law acts on measured positions with errors of at most e_i and e_j, then with e = e_i + e_j (Budget.budget_always)
 
     d_law = e + sqrt((d + b + covers + dips)^2 + e^2) + (drift_i + drift_j) / A',
 
-if e (1 - A' h) <= A' h times what the points then keep at the samples, d_law - e - drifts / A'. Beside a set at rest
-A' = A. Of two robots one may have to stand, because measured inequalities contradict one another: then the pair meets
-the law with A' = A / 2 (theorem Budget.one_stands). So it is where one of them may lack the other's position.
+if e (1 - A' h) <= A' h (d_law - e - drifts / A'), where the last factor is the distance of the points at the samples.
+Beside a static set A' = A. One of two robots may have to stand, because measured inequalities contradict one another or
+because it misses the other's position: then the pair meets the law with A' = A / 2 (theorem Budget.one_stands).
 """
 
 import math
@@ -32,7 +33,7 @@ from airground_drake.base.arrays import Array
 
 
 class Bounds(NamedTuple):
-    """How far a body may be from where the law steers it."""
+    """Bounds of a body's deviation from its steered point."""
 
     cover_m: float = 0.0  # of the body from the steered point
     dip_m: float = 0.0  # of the steered point from the straight line of its command within a period
@@ -49,17 +50,17 @@ class Bounds(NamedTuple):
 
     @property
     def exact(self) -> bool:
-        """Whether the body is the steered point, moves as it is told, and is where it is seen."""
+        """Whether body, steered point and measured position coincide, and commands are followed exactly."""
         return not (any(self[:5]) or self.error_m)
 
     @property
     def late(self) -> bool:
-        """Whether commands under way lead the body on."""
+        """Whether the body still follows earlier commands."""
         return self.lag_s > 0.0 or self.delay_s > 0.0
 
     @property
     def rolling_m(self) -> float:
-        """How far the body may be from the steered point in all, but for drift, m."""
+        """Largest distance of the body from the steered point, without drift, m."""
         return self.cover_m + self.dip_m + (self.lag_s + self.delay_s) * self.speed_m_s
 
 
@@ -67,7 +68,7 @@ AT_REST = Bounds()  # of a set that does not move
 
 
 class Cost(NamedTuple):
-    """A term of the budget: what it is of, which of the two bodies has it (0, 1; -1: both), and its metres."""
+    """A term of the budget: its cause, its body (0, 1; -1: both), and its size in m."""
 
     term: str
     of: int
@@ -77,7 +78,7 @@ class Cost(NamedTuple):
 def law_distance(
     distance: Array | float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False
 ) -> Array | float:
-    """Distance that the law keeps between steered points so that the bodies keep `distance`, m: shape of `distance`."""
+    """Distance that the law must keep between steered points so that bodies keep `distance`, m, of any shape."""
     # gain: 1/s
     # passive: beside an obstacle that may move.
     if one.exact and other.exact:
@@ -103,7 +104,7 @@ def part_of_gain(one: Bounds, other: Bounds = AT_REST) -> float:
 
 
 def least_gain(distance: float, one: Bounds, other: Bounds = AT_REST) -> float:
-    """The least A h with which a pair bears the errors of its measured positions, for a `distance` of bodies, m."""
+    """The least A h for which the theorem covers the pair's position errors; `distance` of bodies in m."""
     error = one.error_m + other.error_m
     undrifting = one._replace(drift_m_s=0.0), other._replace(drift_m_s=0.0)
     kept = float(law_distance(distance, *undrifting, gain=1.0)) - error
@@ -111,7 +112,7 @@ def least_gain(distance: float, one: Bounds, other: Bounds = AT_REST) -> float:
 
 
 def kept_distance(points: float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False) -> float:
-    """Distance that bodies keep where their steered points keep `points`, m, from below: `law_distance` inverted."""
+    """Lower bound of the bodies' distance if steered points keep `points`, m: the inverse of `law_distance`."""
     # -inf where nothing is promised: within tau V of a set, say, the body may be anywhere beside it.
     added = list(_added(one, other, gain=gain, passive=passive))
     if error := one.error_m + other.error_m:
@@ -140,7 +141,7 @@ def _leg(hypotenuse: float, leg: float) -> float:
 
 
 def costs(distance: float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False) -> list[Cost]:
-    """The terms above 0 of what `law_distance` adds to a distance, m, in the order in which they are added."""
+    """The positive terms that `law_distance` adds to a distance, m, in order."""
     found = list(_added(one, other, gain=gain, passive=passive))
     if not passive:
         delay = _delay(one, other)
@@ -155,7 +156,7 @@ def costs(distance: float, one: Bounds, other: Bounds = AT_REST, *, gain: float,
 
 
 def _added(one: Bounds, other: Bounds, *, gain: float, passive: bool) -> Iterator[Cost]:
-    """The terms that are the same for all distances, but for a delay."""
+    """The terms that do not depend on the distance, without delays."""
     gain *= part_of_gain(one, other)
     for k, bounds in enumerate((one, other)):
         yield Cost("cover", k, 0.0 if k == 0 and _draws(one, other, passive=passive) else bounds.cover_m)
@@ -167,17 +168,17 @@ def _added(one: Bounds, other: Bounds, *, gain: float, passive: bool) -> Iterato
 
 
 def _draws(one: Bounds, other: Bounds, *, passive: bool) -> bool:
-    """Whether the first body is drawn after its steered point beside a set at rest."""
+    """Whether the first body trails its steered point beside a static set."""
     return one.drawn and other == AT_REST and not passive
 
 
 def _delay(one: Bounds, other: Bounds) -> float:
-    """What different delays cost, m. A set at rest counts as one with the robot's delay, since its speed is 0."""
+    """Cost of different delays, m. A static set counts as having the robot's delay, since its speed is 0."""
     return min(one.speed_m_s, other.speed_m_s) * abs(one.delay_s - other.delay_s)
 
 
 def _lagging(distance: Array | float, one: Bounds, other: Bounds) -> Array | float:
-    """The distance before lags for a distance after them, m: the least over tau = 0, tau_i and tau_j."""
+    """The distance of steered points for a distance of lagging bodies, m: the least over tau = 0, tau_i and tau_j."""
     if not (one.lag_s or other.lag_s):
         return distance
     closing = one.speed_m_s + other.speed_m_s
@@ -190,5 +191,5 @@ def _lagging(distance: Array | float, one: Bounds, other: Bounds) -> Array | flo
 
 
 def _apart(one: Bounds, other: Bounds, tau: float) -> float:
-    """What lags cost that differ from tau, m."""
+    """Cost of lags that differ from tau, m."""
     return abs(one.lag_s - tau) * one.speed_m_s + abs(other.lag_s - tau) * other.speed_m_s

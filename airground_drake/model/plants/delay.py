@@ -16,7 +16,7 @@ from airground_drake.model.plants.plant import PLACE, Keys, Need, Plant, Premise
 
 @dataclass(slots=True, kw_only=True)
 class DelayKeys(Keys):
-    """Commands take effect later; the law steers where it will be when those under way are carried out."""
+    """Commands take effect after a delay; the law steers the point reached after all pending commands."""
 
     kind: Literal["delay"]
     """A delay; in a list a lag may follow it."""
@@ -37,9 +37,10 @@ class DelayKeys(Keys):
 
 @dataclass(frozen=True)
 class Delay(Plant):
-    """A body whose commands take effect after some periods. The law steers where it will be when all are carried out.
+    """A body whose commands take effect after some periods.
 
-    Its memory are the commands under way, the oldest first, m/s, and then that of `after`.
+    The law steers the point reached after all pending commands. The memory consists of the pending commands, the oldest
+    first, m/s, and then the memory of `after`.
     """
 
     periods: int  # the delay, in control periods
@@ -67,18 +68,18 @@ class Delay(Plant):
         return self.after.needs(speed_m_s)
 
     def memory(self) -> Array:
-        """No command is under way."""
+        """No pending commands."""
         return np.concatenate([np.zeros(3 * self.periods), self.after.memory()])
 
     def remembered(self, memory: Array, command: Array, elapsed_s: float) -> Array:
-        """The oldest command has taken effect, and the new one is under way."""
+        """The oldest command takes effect, and the new one becomes pending."""
         if elapsed_s == 0.0:
             return memory
         under_way = memory[3 : 3 * self.periods], command
         return np.concatenate([*under_way, self.after.remembered(*self._of_after(memory), elapsed_s)])
 
     def at(self, memory: Array, base: Array, command: Array, elapsed_s: float) -> Array:
-        """Exact: all commands under way are still to come."""
+        """Exact: the steered point minus the motion of all pending commands."""
         coming = memory[: 3 * self.periods].reshape(-1, 3)
         inner, now = self._of_after(memory)
         behind = base - elapsed_s * command - self.period_s * coming.sum(axis=0) + elapsed_s * now
@@ -94,5 +95,5 @@ class Delay(Plant):
         return self.after.premises(run)
 
     def _of_after(self, memory: Array) -> tuple[Array, Array]:
-        """The memory of `after`, and the command that takes effect now."""
+        """The memory of the plant `after` the delay, and the command that takes effect now."""
         return memory[3 * self.periods :], memory[:3]

@@ -56,7 +56,7 @@ class Lag(Plant):
         return np.concatenate([base - self.time_s * velocity, velocity])
 
     def bends_m(self, t_s: Array, signals: Array) -> Array:
-        """From the velocities at both ends."""
+        """Computed from the velocities at both ends."""
         # Its acceleration is at most ||v - u|| / tau, and ||v - u|| falls by exp(-s / tau) in s seconds.
         lasting, change = np.diff(t_s), np.linalg.norm(np.diff(signals[:, 3:], axis=0), axis=1)
         gone = -np.expm1(-lasting / self.time_s)
@@ -64,7 +64,7 @@ class Lag(Plant):
         return np.asarray(short / self.time_s * np.square(lasting) / 8.0)
 
     def between(self, t_s: Array, signals: Array, shares: Array) -> Array:
-        """As the equation of the lag says, from places and velocities at both ends."""
+        """Solution of the lag's equation, from positions and velocities at both ends."""
         lasting = float(t_s[1] - t_s[0])
         if lasting <= 0.0:
             return super().between(t_s, signals, shares)

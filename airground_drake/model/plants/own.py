@@ -1,4 +1,4 @@
-"""A user's own Drake System, whose motion is not known here: it declares a drift and a cover."""
+"""A user's own Drake System: only its declared drift and cover are known here."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from airground_drake.model.plants.plant import PLACE, Keys, Plant, Premise, Reco
 
 @dataclass(slots=True, kw_only=True)
 class OwnKeys(Keys):
-    """The user's own Drake System, with a drift and a cover that are declared. Each run measures both."""
+    """The user's own Drake System, with declared drift and cover. Each run measures both."""
 
     kind: Annotated[Words, ValueRule(str, lambda: {"anyOf": [{"enum": PLANTS.others}, {"pattern": PLUGIN_PATTERN}]})]
     """Its class: `module:Class` or `file.py:Class`."""

@@ -1,10 +1,10 @@
-"""How a body moves: a robot under a velocity command that is held for a period, an obstacle by its script.
+"""Motion models: robots under velocity commands held for a period, and scripted obstacles.
 
 The law steers a point of each robot. Under every plant that point, from sample to sample, moves as the command says.
 Within a period it may leave the straight line by a *dip*, and the body may be elsewhere, within a *cover*: see
 `model.plants.budget`. The straight line is the *base*: a first-order robot that starts where the steered point is. So
-Drake integrates the base exactly, and all else is in closed form: a *memory* at each control sample, and the signals of
-the body from base, command and memory. `sim.blocks.plant` makes the Drake systems.
+Drake integrates the base exactly, and the rest is in closed form: a *memory* (state) at each control sample, and the
+signals of the body from base, command and memory. `sim.blocks.plant` makes the Drake systems.
 
 A plant is one file: its keys in a scenario (`Keys`) and all that others ask of it (`Plant`). A line of
 `base.registry.PLANTS` gives it its name.
@@ -28,7 +28,7 @@ HEADING = "heading_rad"  # the signal of a body that has one
 
 
 class Setting(NamedTuple):
-    """What the rules of a plant's keys may depend on."""
+    """Values on which the rules of a plant's keys may depend."""
 
     period_s: float  # control period
     gain_1_s: float  # of avoidance
@@ -38,7 +38,7 @@ class Setting(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class Keys:
-    """What a scenario says of a plant: a base class of dataclasses, whose fields are its keys."""
+    """The keys of a plant in a scenario: a base class of dataclasses whose fields are the keys."""
 
     kind: str  # its name; it chooses among the classes
     is_own: ClassVar[bool] = False  # whether it is a class of the user's
@@ -54,12 +54,12 @@ class Keys:
         return False
 
     def problems(self, setting: Setting) -> Iterator[tuple[str, object, str]]:
-        """Key, value and what is allowed, where two keys do not go together."""
+        """Key, value and allowed values, for keys that contradict each other."""
         yield from ()
 
 
 class Recorded(NamedTuple):
-    """What a run recorded of a robot: T rows, K whole control periods, S control samples."""
+    """The record of a robot in a run: T rows, K whole control periods, S control samples."""
 
     t_s: Array  # (T,)
     signals: Array  # those of its plant, (T, k)
@@ -71,7 +71,7 @@ class Recorded(NamedTuple):
 
 
 class Premise(NamedTuple):
-    """A hypothesis of the theorems about a plant along a run: it holds where margins are at least 0."""
+    """A hypothesis of a plant's theorems about a run: it holds where margins are at least 0."""
 
     name: str
     unit: str
@@ -80,7 +80,7 @@ class Premise(NamedTuple):
 
 
 class Need(NamedTuple):
-    """A hypothesis of the theorems about a plant on its numbers: the margin is at least 0, or above it."""
+    """A hypothesis of a plant's theorems about its parameters: the margin is at least 0, or above 0."""
 
     symbol: str
     says: str
@@ -90,7 +90,7 @@ class Need(NamedTuple):
 
 
 class Plant:
-    """The motion of a robot, period by period. What is here is that of a robot that moves as it is told."""
+    """The motion of a robot, period by period. This base class follows commands exactly."""
 
     # Names of what a run measures of it in each control period, in the samples: then its motion is not known here.
     measured: ClassVar[tuple[str, ...]] = ()
@@ -103,7 +103,7 @@ class Plant:
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Names of what the states record of the body; units at their ends, the place first. Empty: it is the point."""
+        """Names of the body's recorded signals, with units, position first; empty if the body is the steered point."""
         return ()
 
     @property
@@ -113,7 +113,7 @@ class Plant:
 
     @property
     def steering(self) -> Array | None:
-        """Numbers for `model.plants.steering`, by which commands are shortened; None: it takes every command."""
+        """Parameters of `model.plants.steering` for shortening commands; None: no limit."""
         return None
 
     def trails(self, speed_m_s: float) -> bool:
@@ -125,15 +125,15 @@ class Plant:
         return start
 
     def bounds(self, speed_m_s: float) -> Bounds:
-        """How far the body may be from where the law steers it, with commands up to a speed, m/s."""
+        """Bounds of the body's deviation from the steered point, with commands up to a speed, m/s."""
         return Bounds(speed_m_s=speed_m_s)
 
     def needs(self, speed_m_s: float) -> Iterator[Need]:
-        """What the theorems ask of its numbers, with commands up to a speed, m/s."""
+        """Hypotheses of the theorems about its parameters, with commands up to a speed, m/s."""
         yield from ()
 
     def memory(self) -> Array:
-        """What is remembered of a body at rest, (k,)."""
+        """The memory of a body at rest, (k,)."""
         return np.empty(0)
 
     def remembered(self, memory: Array, command: Array, elapsed_s: float) -> Array:
@@ -141,7 +141,7 @@ class Plant:
         return memory
 
     def at(self, memory: Array, base: Array, command: Array, elapsed_s: float) -> Array:
-        """The signals of the body, s after the last sample: from the memory then, and base (3,), m, and command now."""
+        """The body's signals a time, s, after a sample: from the memory there, and base (3,), m, and command now."""
         return np.empty(0)
 
     def bends_m(self, t_s: Array, signals: Array) -> Array:

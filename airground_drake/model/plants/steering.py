@@ -1,4 +1,4 @@
-"""Chord steering of unicycles, compiled: with which speed and turning rate a hand point arrives where the law wants it.
+"""Chord steering of unicycles, compiled: speed and turning rate that bring the hand point to the commanded point.
 
 The hand point is ahead of the axle by l. For a command u = (a, b), in the frame of the body, held for a period h,
 
@@ -48,7 +48,7 @@ def chord(a: float, b: float, hand: float, period: float) -> tuple[float, float]
 
 @njit(cache=True)
 def share(a: float, b: float, steering: Array, period: float) -> float:
-    """The share s of a command (a, b), m/s, in the frame of the body, that a unicycle can do: above 0, at most 1."""
+    """The feasible factor s of a command (a, b), m/s, in the frame of the body: above 0, at most 1."""
     hand, most, found = steering[HAND], steering[TURN], 1.0
     if most * period < math.pi:
         tangent = math.tan(0.5 * most * period)

@@ -22,10 +22,10 @@ Ahead = Annotated[Number, _AHEAD, BeforeValidator(as_float)]
 
 @dataclass(slots=True, kw_only=True)
 class UnicycleKeys(Keys):
-    """A differential drive (UGVs), steered by a hand point ahead of its axle.
+    """A differential drive (UGVs), controlled by a hand point ahead of its axle.
 
-    The hand point arrives exactly where the law wants it; commands for which the robot would have to turn or drive too
-    fast are shortened.
+    The hand point can move in any direction, and arrives exactly at the commanded point. Commands that need too fast a
+    turn or wheel are shortened.
     """
 
     kind: Literal["unicycle"]
@@ -97,7 +97,7 @@ class Unicycle(Plant):
         return min(self.max_turn_rad_s, wheels)
 
     def trails(self, speed_m_s: float) -> bool:
-        """Where its hand point cannot go aside so fast."""
+        """Whether the hand point cannot move sideways at this speed."""
         return self.max_turn_rad_s * self.hand_m < speed_m_s
 
     def turning_rad_s(self, speed_m_s: float) -> float:
@@ -181,7 +181,7 @@ class Unicycle(Plant):
 
 
 def may_swing_round(plant: Unicycle, speed_m_s: float) -> str:
-    """What is allowed for a hand point with which the axle could swing round within a period; '' for others."""
+    """The allowed values, if the axle could swing round within a period with this hand point; otherwise ''."""
     h, least = plant.period_s, 0.5 * speed_m_s * plant.period_s
     if plant.hand_m >= least or plant.limit_rad_s * h < math.pi:
         return ""

@@ -39,7 +39,7 @@ def rise(status: Array, t: float) -> None:
 
 @njit(cache=True)
 def begin(status: Array, t: float, x: Array, levels: Array) -> None:
-    """At the initial time, s: who is already at or above the threshold triggers at once; `status` (4n,), in place."""
+    """Initialise at a time, s: UGVs at or above the threshold trigger at once; `status` (4n,), in place."""
     for j in range(len(x)):
         if x[j] >= levels[0]:
             rise(status[FIELDS * j : FIELDS * (j + 1)], t)
@@ -65,7 +65,7 @@ def step(status: Array, t: float, x: float, levels: Array) -> None:
 
 @njit(cache=True)
 def transitions_due(status: Array, t: float, spans: Array, levels: Array) -> Flags:
-    """For which UGVs a transition is due, (n,), by the least x since a step began, then the largest, (2n,), m."""
+    """UGVs with a due transition, (n,), from the range of x since the step began: least, then largest, (2n,), m."""
     zeta, release, dwell = levels[0], levels[1], levels[2]
     n = len(spans) // 2
     due = np.zeros(n, dtype=np.bool_)
@@ -82,7 +82,7 @@ def transitions_due(status: Array, t: float, spans: Array, levels: Array) -> Fla
 
 @njit(cache=True)
 def are_numbers(spans: Array) -> bool:
-    """Whether no entry is NaN, which no comparison with a level would notice."""
+    """Whether no entry is NaN; comparisons with a level would ignore NaN."""
     return not np.isnan(spans).any()
 
 
@@ -127,13 +127,13 @@ class TriggerState:
 
     @classmethod
     def of(cls, status: Array) -> Self:
-        """Of a status, (4,)."""
+        """The state of a compiled status, (4,)."""
         mode, triggers, *times = status.tolist()
         return cls(Mode(int(mode)), int(triggers), *times)
 
     @property
     def status(self) -> Array:
-        """As a status, (4,)."""
+        """The compiled status, (4,)."""
         return np.array([self.mode, self.triggers, self.triggered_at, self.released_at], dtype=np.float64)
 
 
@@ -162,7 +162,7 @@ class Trigger:
 
     @property
     def levels(self) -> Array:
-        """As the compiled automaton takes them, (3,)."""
+        """The levels for the compiled automaton, (3,)."""
         return np.array([self.zeta, self.release, self.dwell], dtype=np.float64)
 
     def start(self, t: float, x: float) -> TriggerState:

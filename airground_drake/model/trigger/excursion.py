@@ -1,4 +1,4 @@
-"""How far the decision variable goes between two instants, exactly.
+"""The exact range of the decision variable between two instants.
 
 Between two updates a task error e moves on a straight line and the noise n is linear, so that x = ||e|| + n is convex:
 it is largest at an end, and smallest at an end or where its slope is 0. Let u be the distance along the change of e
@@ -26,7 +26,7 @@ from airground_drake.model.geometry.moving import at
 
 
 class Corners(NamedTuple):
-    """Where the references of n UGVs bend: the vertices of their presets, which are straight in between."""
+    """Corners of the references of n UGVs: the vertices of their presets."""
 
     times: Array  # of all vertices, in order, (C,), s
     ugvs: npt.NDArray[np.int64]  # whose they are, (C,)
@@ -37,7 +37,7 @@ class Corners(NamedTuple):
 
     @classmethod
     def of(cls, presets: Sequence[Motion]) -> Corners:
-        """Of presets; without presets no reference bends."""
+        """The corners of presets; without presets there are none."""
         order = sorted((t, j) for j, preset in enumerate(presets) for t in preset.times.tolist())
         return cls(
             np.array([t for t, _ in order], dtype=np.float64),

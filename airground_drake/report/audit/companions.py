@@ -35,7 +35,7 @@ LIGHT = "c, error weight 1"
 
 
 class Believing(OutcomeGatekeepers):
-    """Gatekeepers that take every proposal for useful."""
+    """Gatekeepers that consider every proposal useful."""
 
     def foresee(self, seen: View, law: UgvLaw, proposal: Proposal) -> tuple[Outcome, Outcome]:
         """Refusing stalls, accepting does not."""
@@ -171,7 +171,7 @@ def _no_dynamics(trace: Trace) -> Item:
 
 
 def _printed_optimum(reference: Array) -> Array:
-    """States (N, 3), m, of least task error in (27) as printed, which ties them to nothing but the initial one."""
+    """States (N, 3), m, of least task error in (27) as printed, which constrains only the initial one."""
     program = MathematicalProgram()
     states = program.NewContinuousVariables(*reference.shape, "rho")
     program.AddQuadraticErrorCost(np.eye(states.size), reference.ravel(), states.ravel())

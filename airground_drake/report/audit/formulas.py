@@ -73,7 +73,7 @@ def _feed_forward(scenario: Scenario) -> Item:
 
 
 def _solutions(slope: float, right: float) -> list[float]:
-    """All x with slope * x = right; [] if the slope is 0."""
+    """The solutions x of slope * x = right; [] if the slope is 0."""
     return [right / slope] if slope else []
 
 

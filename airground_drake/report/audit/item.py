@@ -20,7 +20,7 @@ CONVERSION = {
 def item(
     number: int, where: str, finding: str, paper: Any, ours: Any, shown: bool, evidence: Item, unit: str = ""
 ) -> Item:
-    """Item `number`, about the place `where` of the paper; `evidence` is what shows it, or does not."""
+    """Item `number`, about the place `where` of the paper, with its `evidence`."""
     return {
         "id": number,
         "where": where,
@@ -134,7 +134,7 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 
 def typeset(items: Iterable[Item]) -> list[dict[str, Any]]:
-    """The items with their formulas (`latex`) and what a fault of the text conversion could explain (`conversion`)."""
+    """The items with formulas (`latex`), and whether a conversion error could explain them (`conversion`)."""
     typeset_items = []
     for item in items:
         paper, ours = FORMULAS.get(item["id"], ((), ()))

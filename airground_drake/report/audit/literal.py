@@ -1,4 +1,4 @@
-"""The paper's gatekeeper by the letter, (27)-(29), and how its answers turn on what the paper leaves open."""
+"""The paper's gatekeeper, (27)-(29) taken literally, and the effect of choices that the paper leaves open."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -34,7 +34,7 @@ DURATIONS_S = {"case_a": 18.0, "case_b": 16.0}
 
 
 class Prediction(NamedTuple):
-    """What a decision rested on: its problem (26), and the closed loop from which the velocities in it are."""
+    """The basis of a decision: its problem (26), and the closed loop that gave its velocities."""
 
     decision: GatekeeperDecision
     problem: Problem
@@ -42,7 +42,7 @@ class Prediction(NamedTuple):
 
 
 class Remembering(PaperGatekeepers):
-    """Gatekeepers of method (c) who keep what they predicted."""
+    """Gatekeepers of method (c) that store their predictions."""
 
     def __init__(self, *parts: Any) -> None:
         super().__init__(*parts)
@@ -57,7 +57,7 @@ class Remembering(PaperGatekeepers):
 
 
 def simulate(scenario: Scenario, run: str) -> tuple[Trace, list[Prediction]]:
-    """A run of method (c), and what its decisions rested on."""
+    """A run of method (c), and the predictions of its decisions."""
     made: list[Remembering] = []
 
     def make(scenario: Scenario, law: UgvLaw) -> Remembering:
@@ -113,7 +113,7 @@ def literal_rule() -> Item:
 
 
 def taken_back(trace: Trace) -> list[dict[str, Any]]:
-    """Acceptances that were refused at the next sample, on the same proposal, with the costs (25) and what followed."""
+    """Acceptances followed by a refusal of the same proposal, with the costs (25) and the outcome."""
     decisions = trace.decisions.sort_values("t_s", kind="stable")
     messages = trace.messages[trace.messages["kind"] == "withdrawal"]
     taken = []
@@ -133,7 +133,7 @@ def taken_back(trace: Trace) -> list[dict[str, Any]]:
 
 
 def _changes(predictions: Sequence[Prediction]) -> list[Prediction]:
-    """The first decision on each proposal, and those that change the answer, up to the first that takes one back."""
+    """The first decision on each proposal, and changes of the answer, up to the first reversed acceptance."""
     changes = [*predictions[:1]]
     for before, prediction in pairwise(predictions):
         same = before.decision.proposal is prediction.decision.proposal
@@ -145,7 +145,7 @@ def _changes(predictions: Sequence[Prediction]) -> list[Prediction]:
 
 
 def variants(problem: Problem, loop: ClosedLoop) -> dict[str, dict[str, Any]]:
-    """Local optima of (27), by what the paper leaves open: first share, answer by (28)-(29), and cost (25)."""
+    """Local optima of (27) for each open choice: first share, answer by (28)-(29), and cost (25)."""
     # - `as run`: the velocities of (23) are those along the two constant plans; the search starts at the cheaper one.
     # - `other start`: the search starts at the dearer one.
     # - `velocities at the plan`: those of the closed loop where the plan leads; the search starts as in the run.
@@ -167,7 +167,7 @@ def _told(omega: Array, cost: float) -> dict[str, Any]:
 
 
 def at_the_plan(problem: Problem, loop: ClosedLoop, start: Array) -> Array:
-    """A local optimum (N,) of (27) with the velocities of (23) where the plan leads."""
+    """A local optimum (N,) of (27) with the velocities of (23) along the plan."""
     minimum = minimize(
         lambda omega: cost_at_the_plan(problem, loop, omega), start, method="SLSQP",
         bounds=[(0.0, 1.0)] * len(start), options={"maxiter": ITERATIONS},
@@ -176,7 +176,7 @@ def at_the_plan(problem: Problem, loop: ClosedLoop, start: Array) -> Array:
 
 
 def cost_at_the_plan(problem: Problem, loop: ClosedLoop, omega: Array) -> float:
-    """(25) of a plan omega (N,) in [0, 1] that takes the velocities of (23) where it leads."""
+    """(25) of a plan omega (N,) in [0, 1] with the velocities of (23) along the plan."""
     return plan_cost(problem.terms, positions_at_the_plan(loop, omega))[0]
 
 

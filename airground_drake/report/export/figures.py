@@ -82,7 +82,7 @@ def _environment(figure: Figure, names: Sequence[str], width: str, report: Repor
 
 
 def _established(claims: Sequence[str], report: Report) -> Iterator[str]:
-    """A sentence per claim: what was proved, what holds in which runs, what is refuted."""
+    """A sentence per claim: proved, refuted, or the runs in which it holds."""
     for name in claims:
         runs_by_status: dict[str, list[str]] = {}
         for claim in report.claims:
@@ -96,7 +96,7 @@ def _established(claims: Sequence[str], report: Report) -> Iterator[str]:
 
 
 def escaped(text: str) -> str:
-    """Text as LaTeX shows it, with the packages amssymb and booktabs; a line break becomes a space."""
+    """Text escaped for LaTeX with the packages amssymb and booktabs; a line break becomes a space."""
     return "".join(_SPECIAL.get(character, character) for character in " ".join(text.split()))
 
 

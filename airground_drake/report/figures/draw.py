@@ -103,7 +103,7 @@ def _select(scenario: Scenario, traces: Mapping[str, Trace]) -> _Selection:
 
 
 def _alike(run: Trace, other: Trace) -> bool:
-    """Whether all robots take the same paths at the same times, and the same happens to the UGVs."""
+    """Whether runs have the same motions of all robots and the same events of UGVs."""
     t = np.union1d(run.t, other.t)
     first, second = ([mark[:6] for mark in maps.marks_of(trace, trace.ugvs)] for trace in (run, other))
     return (

@@ -1,4 +1,4 @@
-"""Pictures of findings about the paper: that of 1 from the runs, each other from its evidence in report.json alone."""
+"""Figures of findings about the paper: for finding 1 from the runs, for others from report.json alone."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

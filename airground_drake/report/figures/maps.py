@@ -36,7 +36,7 @@ LOOKS: dict[str, dict[str, Any]] = {
 
 
 class Mark(NamedTuple):
-    """What happened to a UGV."""
+    """An event of a UGV on a map."""
 
     ugv: str  # its name
     t_s: float  # when, s
@@ -58,7 +58,7 @@ class Entry(NamedTuple):
 
 
 def marks_of(trace: Trace, ugvs: Sequence[str]) -> list[Mark]:
-    """What happened to UGVs in a run, by time: stalls, answers to proposals, and first collisions."""
+    """Events of UGVs in a run, by time: stalls, answers to proposals, and first collisions."""
     every = trace.derived("marks of maps", lambda: [*_stalls(trace), *_answers(trace), *_collisions(trace)])
     return sorted((mark for mark in every if mark.ugv in ugvs), key=lambda mark: mark.t_s)
 
@@ -72,7 +72,7 @@ def _stalls(trace: Trace) -> Iterator[Mark]:
 
 
 def _answers(trace: Trace) -> Iterator[Mark]:
-    """Where UGVs were when they answered proposals; or when a proposal was sent that they never answered."""
+    """Positions of UGVs when they answered proposals, or when an unanswered proposal was sent."""
     for sent in interventions(trace):
         ugv, end = sent["robot"], sent["ended"]
         kind, t_s, why = "unanswered", sent["sent_s"], f": {end['how']}"
@@ -97,12 +97,12 @@ def _collisions(trace: Trace) -> Iterator[Mark]:
 
 
 def _s(t_s: float, digits: int = 2) -> str:
-    """A time that no line break parts from its unit."""
+    """A time with a no-break space before its unit."""
     return f"{t_s:.{digits}f}\N{NO-BREAK SPACE}s"
 
 
 def told(marks: Iterable[Mark]) -> str:
-    """Marks in words; those that differ in their times only together."""
+    """Marks in words; those that differ only in time are grouped."""
     alike = grouped(((mark.what, mark.why), mark.when) for mark in marks)
     return "; ".join(f"{what} {', '.join(times)}{why}" for (what, why), times in alike.items())
 
@@ -112,7 +112,7 @@ def _at(trace: Trace, robot: str, t_s: float) -> Array:
 
 
 def key_of(trace: Trace, ugvs: Sequence[str], frame: Frame) -> list[Entry]:
-    """The text below a map: an entry per place of a UGV; or per UGV if more happened than can be told one by one."""
+    """The text below a map: an entry per place of a UGV, or per UGV if there are too many."""
     marks = marks_of(trace, ugvs)
     if len(marks) > MAX_MARKS:
         return [_of_ugv(trace, ugv, of) for ugv in ugvs if (of := [mark for mark in marks if mark.ugv == ugv])]
@@ -127,7 +127,7 @@ def key_of(trace: Trace, ugvs: Sequence[str], frame: Frame) -> list[Entry]:
 
 
 def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
-    """How a UGV ended and how often it answered; its stalls and collisions are drawn, and its last proposal."""
+    """An entry for a UGV with many events; its stalls, collisions and last proposal are drawn."""
     sent = [mark for mark in marks if len(mark.way)]
     others = [mark for mark in marks if not len(mark.way)]
     arrived = events_of(trace, ugv, "arrival")

@@ -32,7 +32,7 @@ class Panel:
     drawing: Drawing = field(compare=False, repr=False)  # source of the SVG, for files of other formats
 
     def __getstate__(self) -> dict[str, object]:
-        """Without the drawing: pages need none, and to send one to another process takes as long as to draw it."""
+        """Omit the drawing, which pages do not need and which is slow to pickle."""
         return {**vars(self), "drawing": None}
 
 
@@ -54,7 +54,7 @@ def panel(drawing: Drawing, name: str, title: str, says: str, heading: str, tabl
 
 
 def spread(count: int, most: int = MAX_TABLE_ROWS) -> Indices:
-    """At most so many of `count` rows, evenly spread, the ends among them."""
+    """At most `most` of `count` rows, evenly spread, including the ends."""
     return np.unique(np.linspace(0, count - 1, most).round().astype(np.intp))
 
 

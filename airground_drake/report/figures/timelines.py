@@ -146,7 +146,7 @@ class _Label(NamedTuple):
 
 
 def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
-    """Decision variables of UGVs and what happened, a row each, without the time in which nothing happened."""
+    """Decision variables and events of UGVs, a row each, without long times without events."""
     happened = {ugv: events_of(trace, ugv, *MARKS) for ugv in ugvs}
     clock = Clock.around([event["t_s"] for those in happened.values() for event in those], *_ends_s(trace))
     labels = {ugv: _labels(those, clock) for ugv, those in happened.items()}
@@ -194,7 +194,7 @@ def _left_out(trace: Trace, clock: Clock) -> str:
 
 
 def _behind(axes: Axes, trace: Trace, ugv: str, clock: Clock) -> None:
-    """What is behind the events of a UGV: its decision variable, both levels, calls of the UAV, and cuts."""
+    """The background of a UGV's events: its decision variable, both levels, interventions, and cuts."""
     t = np.union1d(trace.t[clock.shows(trace.t)], [clock.begin, clock.end])
     zeta = float(trace.meta["zeta_m"])
     x = np.interp(t, trace.t, trace.column(f"{ugv}.decision_variable_m"))

@@ -1,4 +1,4 @@
-"""What one imperfection changes, as a picture: distances and arrivals by its values."""
+"""A figure of distances and arrivals over the values of one imperfection."""
 
 import pandas as pd
 from matplotlib.figure import Figure

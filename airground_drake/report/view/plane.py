@@ -83,7 +83,7 @@ def axes_over(frame: Frame, width_in: float, full_in: float = 0.0, below_in: flo
 
 
 def draw_barriers(axes: Axes, scenario: Scenario, *, moving: bool = True) -> tuple[list[Label], list[Array]]:
-    """Draw all that stands about within the outlines that robots' surfaces keep to, the arena, and phantoms."""
+    """Draw obstacles with the outlines that robots' surfaces must not enter, the arena, and phantoms."""
     # What the UAV does not know is hollow. Points and balls have a hexagon in the middle. What moves is drawn where it
     # starts, with its way in dots, unless `moving` is False.
     # Returns labels, the names of the barriers, unless they are many, and of phantoms; and lines (K, 2), m, that labels

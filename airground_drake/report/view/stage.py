@@ -1,4 +1,4 @@
-"""The robots and obstacles of a scenario, as large as they are drawn."""
+"""The robots and obstacles of a scenario with the sizes at which they are drawn."""
 
 from dataclasses import dataclass, field
 
@@ -50,7 +50,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Barrier:
-    """An obstacle, or anything else that stands about, except the walls of the arena."""
+    """An obstacle or phantom, except the walls of the arena."""
 
     name: str  # of the scenario
     parts: Array  # outlines of its convex parts at the start, (k, W), world frame; see `model.geometry.outline`
@@ -88,7 +88,7 @@ class Barrier:
 
     @property
     def safe_m(self) -> Array:
-        """How far the surfaces of UGVs stay away from the cores of its parts, (k,), m."""
+        """Distances that UGVs' surfaces keep from the cores of its parts, (k,), m."""
         return outline.keep(self.parts, 0.0)
 
     @property
@@ -98,7 +98,7 @@ class Barrier:
 
     @property
     def safe(self) -> list[Array]:
-        """Where the surfaces of UGVs must not be because of each of its parts: polygons (K, 2), m."""
+        """The areas that UGVs' surfaces must not enter, for each part: polygons (K, 2), m."""
         return self._rims(self.safe_m)
 
     @property
@@ -130,7 +130,7 @@ class Barrier:
 
 @dataclass(frozen=True)
 class Stage:
-    """A scenario before anything moves."""
+    """A scenario at the start."""
 
     # `low_m` and `high_m` (3,) bound what is shown. `mark_m` is the radius with which a point is drawn. `phantoms_m`
     # (P, 3) are the obstacles that only the UAV's map has. `arena` is as `arena_of` gives it.
@@ -172,7 +172,7 @@ def stage_of(trace: Trace, scenario: Scenario) -> Stage:
 
 
 def barriers_of(scenario: Scenario, mark: float = 0.0) -> tuple[Barrier, ...]:
-    """All that stands about but the walls of the arena; points and thin walls are drawn with at least a mark, m."""
+    """All obstacles and phantoms but the walls of the arena; `mark` is the least drawn width, m."""
     specs = {name: spec for name, spec in scenario.barriers.items() if not name.startswith(ARENA)}
     parts = {name: outlines_of(scenario, spec) for name, spec in specs.items()}
     rays = FINE if sum(map(len, parts.values())) <= MANY else COARSE

@@ -6,8 +6,8 @@ these, and integrates to the next event. An event of the trigger is isolated by 
 the witness has not fired ends the step. Planner and gatekeepers stay Python: where one of them has something to do, the
 loop stops in front of its update (`PYTHON`), and goes on after it.
 
-All is bit by bit as in Drake. So nothing here may be summed in another order, contracted or taken from BLAS, and `log`
-must be that of the C library.
+All results equal Drake's bit by bit. So no sum here may be reordered, contracted or computed by BLAS, and `log` must be
+the C library's.
 """
 
 from typing import NamedTuple
@@ -44,7 +44,7 @@ SIGNALS = 4  # of a unicycle: the place of its axle, m, and its heading, rad
 
 
 class Team(NamedTuple):
-    """What stays during a run of n UGVs and one UAV."""
+    """The constants of a run of n UGVs and one UAV."""
 
     law: Numbers  # of the UGVs
     layer: Layer  # of the UAV
@@ -68,7 +68,7 @@ class Team(NamedTuple):
 
 
 class Around(NamedTuple):
-    """What is around the robots now."""
+    """The robots' present surroundings."""
 
     ugvs: Neighbours
     uav: Neighbours
@@ -87,7 +87,7 @@ class Accepted(NamedTuple):
 
 
 class State(NamedTuple):
-    """What changes."""
+    """The variables of a run."""
 
     # Now; when the trigger's step began; number of short steps in a row; until when the planner sleeps, and until when
     # the gatekeepers do, (5,).
@@ -138,14 +138,14 @@ def hold(breaks: Array, holds: Array, t: float, value: Array, rate: Array) -> No
 
 @njit(cache=True)
 def since(t: float, sampled: float, period: float) -> float:
-    """Time since the last control sample, s; a whole period where only rounding keeps it apart."""
+    """Time since the last control sample, s; a whole period if it differs from that only by rounding."""
     elapsed = t - sampled
     return period if abs(elapsed - period) <= 1e-9 else elapsed
 
 
 @njit(cache=True)
 def headings_at(t: float, state: State, steering: Array, period: float) -> Array:
-    """Headings of the UGVs, (n,), rad; 0 of one that is no unicycle."""
+    """Headings of the UGVs, (n,), rad; 0 for other plants than unicycles."""
     found, heading, command, elapsed = (
         np.zeros(len(steering)),
         state.heading,
@@ -160,7 +160,7 @@ def headings_at(t: float, state: State, steering: Array, period: float) -> Array
 
 @njit(cache=True)
 def advance(team: Team, around: Around, accepted: Accepted, state: State, log: Log, until: float, enter: int) -> int:
-    """Simulate up to a time, s, or to an update that Python makes; returns why it stopped."""
+    """Simulate up to a time, s, or to an update made in Python; returns the reason to stop."""
     # At that time the row is published, and the updates of the instant are still to be made.
     # Reading an array of a tuple counts references: once, here.
     law, layer, uav_task, steering, turns, levels, corners, breaks, holds = team[:9]

@@ -1,10 +1,10 @@
-"""The noise of a run as Drake's RandomSource gives it, without Drake's Simulator.
+"""The noise of a run, equal to Drake's RandomSource, without Drake's Simulator.
 
 A diagram in which one RandomSource draws gets, by `SetRandomContext(context, RandomGenerator(seed))`, the first output
 of mt19937(seed) as the seed of the source, which has an mt19937 of its own. libstdc++ makes normal numbers by
 Marsaglia's polar method from doubles of two words each, and keeps the second number of a pair for the next call. The
-first set of numbers is drawn by SetRandomContext and thrown away. Other standard libraries do it in another way, so
-`gaussians` asks Drake itself where a first look finds a difference.
+first set of numbers is drawn by SetRandomContext and discarded. Other standard libraries use other methods; `gaussians`
+then takes the numbers from Drake itself.
 """
 
 import math
@@ -42,13 +42,13 @@ def _made(seed: int, count: int, sets: int) -> Array:
 
 
 def _words(source: np.random.RandomState, count: int) -> npt.NDArray[np.uint32]:
-    """The next outputs of an mt19937."""
+    """The next outputs of a mt19937 generator."""
     return source.randint(0, 2**32, size=count, dtype=np.uint32)
 
 
 @njit(cache=True)
 def _polar(words: npt.NDArray[np.uint32], values: Array, made: int, wanted: int) -> tuple[int, int]:
-    """Add numbers made from words, until all are there or words are lacking; how many are there, and words used."""
+    """Convert words to normal numbers, until there are enough or words run out; returns both counts."""
     used = 0
     while made < wanted and used + 4 <= len(words):
         u = (float(words[used]) + float(words[used + 1]) * 4294967296.0) / 2.0**64
@@ -77,5 +77,5 @@ def _of_drake(seed: int, count: int, sets: int) -> Array:
 
 @cache
 def _is_drakes() -> bool:
-    """Whether the numbers made here are Drake's, by a first look."""
+    """Whether the first numbers made here equal Drake's."""
     return np.array_equal(_made(0, 3, LOOK), _of_drake(0, 3, LOOK))

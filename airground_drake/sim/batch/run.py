@@ -1,4 +1,4 @@
-"""A run of a scenario by the compiled loop: set up once, then as often as there are seeds."""
+"""Runs of a scenario in the compiled loop: set up once, then repeated with any seeds."""
 
 from __future__ import annotations
 
@@ -47,18 +47,18 @@ from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inp
 
 
 class LeftToDrakeError(Exception):
-    """The loop cannot make this run, or it ends in an error, which Drake then tells; the message says why."""
+    """The loop does not support this run, or it ends in an error that Drake will report; the message says why."""
 
 
 class Batch:
-    """A run of a valid scenario; raises LeftToDrakeError at once where the loop cannot make it."""
+    """A run of a valid scenario; raises LeftToDrakeError if the loop does not support it."""
 
     # Left to Drake: users' plants and controllers, channels, errors of positions, several UAVs, one that is lost, tasks
     # of the UAV that are not the package's, gatekeepers with a limit by the clock. Monitors, observers, decision blocks
     # and disturbances are no part of a scenario.
 
     def __init__(self, scenario: Scenario, name: str) -> None:
-        """Set it up: everything that does not depend on the seed."""
+        """Prepare everything that does not depend on the seed."""
         self.scenario, self.name = scenario, name
         run, given = scenario.runs[name], own(scenario, name)
         self.given = given
@@ -133,7 +133,7 @@ class Batch:
 
     @cached_property
     def meta(self) -> dict[str, Any]:
-        """What only the simulation knows, for its traces."""
+        """The metadata that only the simulation knows, for its traces."""
         r, sampling_s = len(self.world.robots), [self.given.control.period_s, 0.0]
         return {
             "zeta_m": self.zeta,
@@ -202,7 +202,7 @@ class Batch:
 
 
 class Going:
-    """A run under way; `deepcopy` copies it, and both go on from there. Policies that remember in themselves do not."""
+    """A run in progress. `deepcopy` copies it, except for state that policies keep in themselves."""
 
     def __init__(self, batch: Batch, seed: int) -> None:
         n = len(batch.headings)
@@ -234,7 +234,7 @@ class Going:
         return self._state.place[: len(self._batch.world.robots)].copy()
 
     def advance(self, until: float) -> None:
-        """Go on to a time, s; the updates of that instant are still to be made; raises as `Batch.simulate`."""
+        """Advance to a time, s, before the updates of that instant; raises as `Batch.simulate`."""
         while True:
             code = loop.advance(self._team, self._around, self._accepted, self._state, self._log, until, self._enter)
             self._enter = loop.AGAIN if code == loop.FULL else loop.GO_ON
@@ -249,7 +249,7 @@ class Going:
                 raise LeftToDrakeError("an error at its end")
 
     def plan_ahead(self) -> None:
-        """Plan for this instant, before its updates, which then take this result; the last one counts."""
+        """Plan for this instant before its updates, which then use this result; the last call counts."""
         self._ahead = self._planned()
 
     @property
@@ -266,7 +266,7 @@ class Going:
         return self._answering.made
 
     def _catch_up(self, tick: int) -> None:
-        """Make the decisions of the ticks before a tick, which only repeat the answers."""
+        """Add the decisions of skipped ticks before a tick, which only repeat the answers."""
         if self._batch.gatekeepers is not None and any(self._memory.proposals):
             slept = slice(self._judged_to, tick)
             times = self._team.ticks[slept][(self._team.due[slept] & loop.GATE) > 0].tolist()
@@ -296,7 +296,7 @@ class Going:
         return trace_of(batch.scenario, batch.name, batch.world, done, batch.world.signals)
 
     def _signals(self, log: Log) -> Array:
-        """What plants record, (T, k): of unicycles by the loop; all others do not act on the run, and follow now."""
+        """Signals of plants, (T, k): of unicycles from the loop; of others computed afterwards."""
         batch, turning = self._batch, iter(np.split(log.signals, log.signals.shape[1] // loop.SIGNALS or 1, axis=1))
         ticks = self._team.ticks[(self._team.due & loop.CONTROL) > 0]
         samples = np.searchsorted(log.t, ticks[ticks <= log.t[-1]], side="right") - 1
@@ -310,7 +310,7 @@ class Going:
         ], axis=1)  # fmt: skip
 
     def _update(self) -> None:
-        """Make the updates of an instant by planner and gatekeepers, which see what both remembered before."""
+        """Make the updates of planner and gatekeepers at an instant; both see the state before either."""
         batch, state, t = self._batch, self._state, self.t
         if state.counts[3] & loop.WATCH:
             self._around = Around(*(batch.world.at(near, t) for near in batch.near))
@@ -336,7 +336,7 @@ class Going:
         state.counts[4] = 1
 
     def _planned(self) -> PlannerState | None:
-        """What the planner remembers after planning at this instant; None at another time, or if nothing changes."""
+        """The planner's memory after planning at this instant; None at other times, or if nothing changes."""
         batch, state, t, memory = self._batch, self._state, self.t, self._memory
         intervening = (state.status[::FIELDS] == INTERVENING).tolist()
         answers, reports = self._answers(), self._answering.reports
@@ -349,7 +349,7 @@ class Going:
         return sent_after(memory, batch.planner.plan(memory, now), t, batch.planner.sender)
 
     def _judged(self) -> GatekeeperState:
-        """What the gatekeepers remember after a sample."""
+        """The gatekeepers' memory after a sample."""
         batch, state, t, before = self._batch, self._state, self.t, self._answering
         proposals, places = self._memory.proposals, state.place.copy()
         gate = batch.gatekeepers if state.counts[3] & loop.GATE else None
@@ -381,7 +381,7 @@ def _schedule(
     periods: tuple[tuple[int, float], ...],
     changes: tuple[float, ...],
 ) -> tuple[Array, loop.Ints]:
-    """Times of all timed events, s, and what is due then: with Drake's own arithmetic, k times the period."""
+    """Times of all timed events, s, and the events due then, by Drake's arithmetic: k times the period."""
     found: dict[float, int] = {}
     for bit, period in ((loop.CONTROL, control_s), (loop.NOISE, noise_s)):
         for k in range(int(duration_s / period) + 2):
@@ -405,7 +405,7 @@ def _holds(breaks: Array, places: Array) -> Array:
 
 
 def _with_end(holds: Array) -> Array:
-    """Pieces of a first-order hold with one more row, which is not used, so that there are as many as breaks."""
+    """Pieces of a first-order hold with an additional unused row, as many as breaks."""
     return np.concatenate([holds, np.zeros((1, *holds.shape[1:]))])
 
 

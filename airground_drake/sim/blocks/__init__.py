@@ -1,4 +1,4 @@
-"""LeafSystems: thin shells that give the pure maths named ports, rates and state."""
+"""LeafSystems: thin wrappers that give the pure maths named ports, rates and state."""
 
 from airground_drake.sim.blocks.channel import Downlink, Uplink
 from airground_drake.sim.blocks.controllers import UavController, UgvController

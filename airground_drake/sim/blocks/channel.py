@@ -1,7 +1,7 @@
 """The channel between UAVs and their UGVs, as two LeafSystems.
 
-What a link delivers is computed from its state, its input and the time; the update at each control period stores the
-same. So a link without delay and loss delays nothing, not even by a period.
+A link's output is computed from its state, its input and the time; the update at each control period stores the same.
+So a link without delay and loss adds no delay, not even a period.
 """
 
 from collections.abc import Iterable, Sequence
@@ -31,7 +31,7 @@ class Down(Immutable):
 
 
 class Downlink(LeafSystem):
-    """From UAVs to their UGVs; a UAV repeats a message until an answer shows that the UGV has read it, or it is lost.
+    """The link from UAVs to their UGVs, with repetition of messages until an answer shows that they were read.
 
     Ports: in `sent`, the planner's memory, with several UAVs one of each, `sent_<uav>`; `heard`, see `Uplink`, used by
     updates only; out `inbox`, all deliveries so far, in the order of arrival.
@@ -42,7 +42,7 @@ class Downlink(LeafSystem):
     def __init__(
         self, link: Link, sent: Iterable[str], start: PlannerState, period: float, retry: float, lost: Sequence[float]
     ) -> None:
-        """Of a link, with the ports `sent`; a message is repeated after `retry`, s."""
+        """Declare the ports; `sent` names those of the UAVs; a message is repeated after `retry`, s."""
         # lost: per UGV, from when on its UAV is lost, s; infinite: never
         super().__init__()
         self._link, self._retry, self._lost = link, retry, lost
@@ -84,7 +84,7 @@ class Downlink(LeafSystem):
 
 
 class Uplink(LeafSystem):
-    """From UGVs to their UAVs.
+    """The link from UGVs to their UAVs.
 
     Ports: in `outbox`, all answers sent so far; out `heard`, the state of the link.
     State: abstract, a `Transit`.

@@ -55,7 +55,7 @@ class _Controller(LeafSystem):
         return self._with_gains(*gains)
 
     def _in_force(self, context: Context) -> Any:
-        """What `_with_gains` returns for the gains in force."""
+        """The result of `_with_gains` for the gains in force."""
         return self.get_cache_entry(self._cached).Eval(context)
 
 
@@ -64,11 +64,10 @@ class UgvController(_Controller):
 
     Ports (n UGVs, M bodies that move, world frame):
         in  `bodies` (3M) m; `reference` (6n): preset positions m, then velocities m/s;
-            `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`.
-            With unicycles `headings` (n), rad: their commands are shortened to what they can do, see
-            `model.plants.steering`.
+            `proposals` abstract, n of Proposal or None; `answers` (2n), see `messages`. With unicycles `headings` (n),
+            rad: their commands are shortened to feasible ones, see `model.plants.steering`.
         out `command` (3n) m/s; `executing` (n), number of the proposal executed, -1 without one; both held.
-            With unicycles `command_share` (n), the share that was left of each command, held.
+            With unicycles `command_share` (n), the factor by which each command was shortened, held.
             `gains`, the `UgvGains` in force, for the gatekeeper, which predicts the command.
     Parameters: `UgvGains`; by default those of the law. ValueError if one is negative, or above one over the control
     period. The sensing range is fixed at construction.
@@ -101,7 +100,7 @@ class UgvController(_Controller):
         self.DeclarePeriodicDiscreteUpdateEvent(law.avoidance.period, 0.0, weakly(self._update))
 
     def parameters(self, context: Context) -> dict[str, Any]:
-        """What it runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
+        """Its parameters, see `read_back`, and whether it puts interventions above avoidance."""
         return of_ugvs(self._near, self._in_force(context), len(self._world.robots), sampling_of(self))
 
     def _with_gains(self, *gains: float) -> UgvLaw:
@@ -124,11 +123,11 @@ class UgvController(_Controller):
         discrete.set_value(1, [NOTHING if proposal is None else float(proposal.number) for proposal in proposals])
 
     def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
-        """`velocity`, with what the ports say beyond its arguments."""
+        """`velocity`; subclasses also use further ports."""
         return self.velocity(t, positions, *about)
 
     def shorten(self, velocity: Array, headings: Array) -> Array:
-        """Shorten commands (n, 3), m/s, in place, to what unicycles with headings (n,), rad, can do."""
+        """Shorten commands (n, 3), m/s, in place, to feasible ones for unicycles with headings (n,), rad."""
         if self._world.steering is None:
             return np.ones(len(velocity))
         left: Array = steer_all(velocity, headings, self._world.steering, self.law.avoidance.period)
@@ -155,7 +154,7 @@ class UgvController(_Controller):
 
 
 def asked_at(proposal: Proposal, t: float) -> AcceptedMotion:
-    """What an accepted proposal asks for at time t, s."""
+    """The demand of an accepted proposal at time t, s."""
     motion = proposal.motion
     wanted, rate = moving.at(motion.times, motion.positions, motion.slopes, t)
     return AcceptedMotion(wanted, rate, proposal.chosen)
@@ -215,7 +214,7 @@ class UavController(_Controller):
         self.DeclarePeriodicDiscreteUpdateEvent(avoidance.period, 0.0, weakly(self._update))
 
     def parameters(self, context: Context) -> dict[str, Any]:
-        """What it runs with, see `read_back`."""
+        """Its parameters, see `read_back`."""
         return read_back(self._near, self._in_force(context)[0], len(self._world.robots), sampling_of(self))
 
     def _with_gains(self, *gains: float) -> tuple[Avoidance, float]:
@@ -244,7 +243,7 @@ class UavController(_Controller):
         return velocity
 
     def _asked(self, positions: Array, ugv_commands: Array, gain: float) -> Array:
-        """Velocity that the task asks for, (1, 3), m/s. The answer of a third-party task is checked."""
+        """Velocity demanded by the task, (1, 3), m/s, checked for third-party tasks."""
         ugvs, own, ugv_commands = positions[self._ugvs], positions[self._own], ugv_commands[self._ugvs]
         if self._task is FormationTask:
             return FormationTask(ugvs, ugv_commands, self._altitude, gain).velocity(own)
@@ -263,7 +262,7 @@ def sampling_of(system: LeafSystem) -> list[float]:
 
 
 def of_ugvs(near: Neighbours, law: UgvLaw, robots: int, sampling_s: list[float]) -> dict[str, Any]:
-    """What the UGVs' controller runs with, see `read_back`, and whether it puts interventions on top of avoidance."""
+    """Parameters of the UGVs' controller, see `read_back`, and whether it puts interventions above avoidance."""
     found = read_back(near, law.avoidance, robots, sampling_s)
     return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
 
@@ -304,7 +303,7 @@ def _in_runs(array: Array) -> list[list[float]]:
 
 
 def _finite(positions: Array) -> Array:
-    """The given positions."""
+    """The positions, checked to be finite."""
     # PluginError if one is not finite, because no robot could avoid such a body.
     if not math.isfinite(positions @ positions) and not np.isfinite(positions).all():  # quickly, then exactly
         raise PluginError(f"positions are not finite, from a plant or a disturbance: {short(repr(positions.tolist()))}")
@@ -312,7 +311,7 @@ def _finite(positions: Array) -> Array:
 
 
 def _velocity_of(task: str, answer: object, position: Array) -> Array:
-    """What a task of this name asks for, checked."""
+    """The velocity demanded by a task, checked; `name` is for messages."""
     try:
         asked = np.asarray(answer)
     except ValueError as error:  # rows of different lengths

@@ -38,7 +38,7 @@ MOST_SHORT = 1000  # largest number of short steps in a row without a transition
 
 
 class DecisionBlock(LeafSystem):
-    """Base of blocks that compute the decision variables x of n UGVs.
+    """Base class of blocks that compute the decision variables x of n UGVs.
 
     Within a step of the simulator, positions, references and noise are linear in time, except at corners of the
     presets. So the block keeps their values at the beginning of the step and outputs the range of x since then: the
@@ -95,7 +95,7 @@ class DecisionBlock(LeafSystem):
         return signals
 
     def _valued(self, t: float, parts: Array) -> Array:
-        """`value`, checked: with a number that is not finite, the trigger would never see a crossing."""
+        """`value`, checked to be finite: otherwise the trigger would see no crossing."""
         given: object = self.value(t, parts)
         with suppress(TypeError, ValueError):
             x = np.asarray(given, dtype=np.float64)
@@ -145,7 +145,7 @@ class DecisionVariable(DecisionBlock):
         return extremes(before, after, ends)
 
     def _with_variable(self, signals: Array) -> Array:
-        """Signals have this x already, unless a subclass defines another."""
+        """Signals already contain this x, unless a subclass defines another."""
         return signals if type(self).value is DecisionVariable.value else super()._with_variable(signals)
 
     def _ranges(self, begun: Array, now: Array) -> Array:

@@ -90,7 +90,7 @@ class Gatekeeper(LeafSystem):
         return self._memory(context).desk or Desk.empty(0)
 
     def _now(self, context: Context) -> Desk:
-        """The desk when all is read that has arrived."""
+        """The desk after reading all messages that have arrived."""
         return read(self.desk(context), self._inbox.Eval(context), context.get_time())
 
     def _update(self, context: Context, state: State) -> EventStatus:
@@ -127,7 +127,7 @@ class DirectAcceptance(LeafSystem):
     """
 
     def __init__(self, count: int, *, channel_period: float | None = None) -> None:
-        """Of so many UGVs; with a channel the controllers' period, s."""
+        """Declare the ports for `count` UGVs; with a channel, `control` is the controllers' period, s."""
         super().__init__()
         self._channel = channel_period is not None
         if channel_period is None:

@@ -24,7 +24,7 @@ from airground_drake.uav.policy import Proposal
 
 
 class _Ahead(list[PlannerState | None]):
-    """The result of planning ahead of the update of an instant; empty without one."""
+    """The result of planning ahead of an update; empty without one."""
 
 
 class InterventionPlanner(LeafSystem):
@@ -121,14 +121,14 @@ class InterventionPlanner(LeafSystem):
         self.get_cache_entry(self._ahead).Eval(context)[:] = [self._planned(context)]
 
     def _answered(self, context: Context) -> tuple[Array, Reports]:
-        """The UGVs' answers, (2n,), and reports, as the UAV has them."""
+        """The UGVs' answers, (2n,), and reports that the UAV has received."""
         if not self._channel:
             return self._answers.Eval(context), self._reports.Eval(context)
         answers, reports = answers_heard(self._heard.Eval(context), range(len(self._planner.ugvs)))
         return np.array(answers), reports
 
     def _planned(self, context: Context) -> PlannerState | None:
-        """The memory after planning at the context's time; None at another time, or if nothing changes."""
+        """The memory after planning at the context's time; None at other times, or if nothing changes."""
         t = context.get_time()
         if not self._ticks.due(t):
             return None
@@ -148,7 +148,7 @@ class InterventionPlanner(LeafSystem):
 
 
 class AllProposals(LeafSystem):
-    """What several UAVs ask of the UGVs, each of its own.
+    """The proposals of several UAVs, each to its own UGVs.
 
     Ports (n UGVs): in `proposals_<uav>`, out `proposals`, abstract, n of Proposal or None.
     """

@@ -1,4 +1,4 @@
-"""Frees Python systems and their diagrams, which pydrake by itself never does.
+"""Frees Python systems and their diagrams, which pydrake never does.
 
 Two kinds of references keep them alive. Drake holds the methods that a system declares, and these hold the system. And
 pydrake makes systems, ports, builders and diagrams refer to each other, so that keeping one of them keeps all; the
@@ -19,12 +19,12 @@ PEERS = "_pydrake_internal_ref_cycle_peers"
 
 
 def weakly(method: Any) -> Callable[..., Any]:
-    """A bound method that does not keep its object alive, for what a system declares about itself."""
+    """A bound method that does not keep its object alive, for a system's declarations."""
     return kept_apart(method.__self__, method.__func__)
 
 
 def kept_apart(of: object, function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of an object without that argument, which does not keep the object alive."""
+    """A function bound to an object, without keeping the object alive."""
     held = ref(of)
     return lambda *arguments: function(held(), *arguments)
 

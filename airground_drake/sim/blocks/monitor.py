@@ -180,7 +180,7 @@ class Monitor(LeafSystem):
         return Violation(sample.t, robot, Rule.LAW, float(away[robot])) if away[robot] > LAW_TOLERANCE_M_S else None
 
     def _by_the_laws(self, context: Context, sample: Sample, laws: Laws, commands: Array) -> Array:
-        """Commands by the laws, (r, 3), m/s; for UGVs the given ones if their inputs are not connected."""
+        """Commands by the laws, (r, 3), m/s; for UGVs the actual ones if the inputs are not connected."""
         # Before the updates of this tick, proposals and answers are still those that the controllers saw at the last
         # one.
         due = commands.copy()

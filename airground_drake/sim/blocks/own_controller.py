@@ -1,4 +1,4 @@
-"""A controller of the user's own for all UGVs: how it is made, and a check of what it commands."""
+"""A user's own controller of all UGVs: construction, and a check of its commands."""
 
 from collections.abc import Callable, Collection
 from functools import partial
@@ -34,7 +34,7 @@ HELD = ("command", "executing", "command_share")  # outputs that change at contr
 
 
 class CheckedCommands(LeafSystem):
-    """What a user's controller commands and executes, passed on if it can be: finite velocities, whole numbers.
+    """Passes on a user's controller's outputs after checking them: finite velocities, integer proposal numbers.
 
     Ports: in and out, each output of the controller by its name.
     """
@@ -68,7 +68,7 @@ class OwnUgvController(Diagram):
     """A user's controller behind `CheckedCommands`; its inputs are those of the user's System."""
 
     def __init__(self, given: OwnController, world: World, law: UgvLaw, make: ControllerFactory | None) -> None:
-        """Make it; `make` is in place of the class that the scenario names."""
+        """Construct it, by `make` or the class that the scenario names."""
         super().__init__()
         self._kind, period = given.kind, law.avoidance.period
         about = f"controller {given.kind!r}"
@@ -96,7 +96,7 @@ class OwnUgvController(Diagram):
         return {"class": self._kind, "sampling_s": sampling_of(self)}
 
     def require_inputs(self, fed: Collection[str]) -> None:
-        """Refuse an input port that nothing feeds."""
+        """Refuse unconnected input ports."""
         for port in inputs_of(self):
             if (name := port.get_name()) not in fed:
                 allowed = f"allowed: {', '.join(sorted(fed))}"
@@ -104,7 +104,7 @@ class OwnUgvController(Diagram):
 
 
 def _outputs(about: str, system: System, sizes: dict[str, int]) -> dict[str, OutputPort]:
-    """Its output ports by name, of the right sizes; what the plants act on is held between control samples."""
+    """Its output ports by name, with checked sizes; those for the plants must be held between control samples."""
     ports = outputs_of(system)
     has = {port.get_name(): port.size() for port in ports}
     if any(has.get(name) != size for name, size in sizes.items()):

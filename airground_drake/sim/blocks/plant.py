@@ -1,4 +1,4 @@
-"""The Drake systems of plants, users' own among them, and of disturbances."""
+"""The Drake systems of plants, including users' own, and of disturbances."""
 
 import copy
 import re
@@ -64,7 +64,7 @@ def vertices_of(body: Body) -> tuple[Array, Array]:
 
 
 class SteeredBody(LeafSystem):
-    """The body of a robot that is not where the law steers it: see `model.plants.plant`.
+    """The body of a robot off its steered point: see `model.plants.plant`.
 
     Ports (world frame):
         in  `velocity` (3) m/s, held for a control period; `base` (3) m, a first-order robot under that velocity.
@@ -104,7 +104,7 @@ class SteeredBody(LeafSystem):
 
 
 def steered_plant(body: Body, period_s: float) -> Diagram:
-    """A robot whose body is not where the law steers it: the base, a `first_order_plant`, and a `SteeredBody`."""
+    """A robot whose body is off its steered point: the base, a `first_order_plant`, and a `SteeredBody`."""
     # Its input is `velocity` (3), m/s; its outputs are `position` (3), m, that of the base, and those of the body.
     assert body.plant is not None
     builder = DiagramBuilder()
@@ -120,7 +120,7 @@ def steered_plant(body: Body, period_s: float) -> Diagram:
 
 
 def name_of(make: Callable[..., Any]) -> str:
-    """What a scenario calls it: `module:Class`, also where it is a function, or its file is called my-robots.py."""
+    """Its name in a scenario, `module:Class`, valid also for functions and files such as my-robots.py."""
     made_by = make if hasattr(make, "__qualname__") else type(make)
     words = [*str(made_by.__module__).split("."), made_by.__qualname__]
     *module, called = (re.sub(r"\W+|^(?=\d|$)", "_", word) for word in words)
@@ -145,7 +145,7 @@ class OwnPlant(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What a scenario calls it, see `name_of`."""
+        """Its name in a scenario, see `name_of`."""
         return name_of(self.make)
 
 
@@ -179,7 +179,7 @@ def declared(
 
 
 class OwnCode(NamedTuple):
-    """Where a user's plant or controller comes from: its name in the scenario, and a function in its file."""
+    """The source of a user's plant or controller: its name in the scenario, and a function in its file."""
 
     name: str
     function: object
@@ -195,7 +195,7 @@ def own_code(scenario: Scenario, plants: Mapping[str, OwnPlant]) -> dict[str, Ow
 
 
 def code_of(name: str, make: Callable[..., System]) -> OwnCode:
-    """A name in the scenario, and a function in the file of what makes the System."""
+    """The name in the scenario and a function in the file of a factory of Systems."""
     functions = filter(isfunction, vars(make).values()) if isinstance(make, type) else ()
     return OwnCode(name, next(iter(functions), make))
 
@@ -204,10 +204,10 @@ GROUND_M = 1e-6  # by so much a UGV's plant may be off the ground, by rounding, 
 
 
 class OwnBody(LeafSystem):
-    """What a user's plant says of its body, passed on if all of it is finite.
+    """Passes on the outputs of a user's plant, checked to be finite.
 
-    A plant that is sampled, such as a discrete MultibodyPlant, jumps from place to place. What is passed on goes
-    straight from each place to the next instead, one step of the plant later: a trace is continuous.
+    The position of a sampled plant, such as a discrete MultibodyPlant, jumps. It is interpolated linearly, one step of
+    the plant later, because a trace is continuous.
 
     Ports (world frame):
         in  `position` (3) and `body` (3), m; `heading` (1), rad, if the plant has one.
@@ -245,7 +245,7 @@ class OwnBody(LeafSystem):
         state.get_mutable_discrete_state().get_mutable_vector(0).SetFromVector(held)
 
     def _now(self, context: Context, index: InputPortIndex) -> Array:
-        """What a port has now; raises PluginError if that cannot be computed, is not finite, or is off the ground."""
+        """A port's value; raises PluginError if it cannot be computed, is not finite, or is off the ground."""
         source = self.get_input_port(index)
         try:
             value: Array = source.Eval(context)
@@ -272,7 +272,7 @@ class OwnBody(LeafSystem):
 
 
 def step_of(system: System) -> float:
-    """The time, s, between the steps of a plant whose states change in steps only, all at once; else 0."""
+    """The period, s, of a plant with synchronous discrete states only; else 0."""
     steps = {*_steps(system)}
     return steps.pop() if len(steps) == 1 and not system.num_continuous_states() else 0.0
 

@@ -1,8 +1,9 @@
-"""Positions between UGVs over links that are late and lose messages: what is announced, what is heard, who stands.
+"""Positions sent between UGVs over links with delay and loss: announcements, receipts, and the controllers' reactions.
 
-Under the shared law a robot publishes at a control sample where it will be at the next one: then messages have a period
-to arrive. Without this sample's message of another UGV a UGV stands, unless that one is surely far; then it leaves it
-out of its law. Under the asynchronous law it publishes where it is, and others act on the last position that they have.
+Under the shared law a robot publishes at a control sample its position at the next one, so messages have a period to
+arrive. If a UGV misses this sample's message of another UGV, it stands still, unless the other one is certainly far;
+then it ignores it. Under the asynchronous law a UGV publishes its current position, and others act on the last received
+position.
 """
 
 import random
@@ -29,7 +30,7 @@ OF_ROBOTS = ("members", "others", "distance", "share", "mobility", "max_speed")
 
 
 class Announcements(LeafSystem):
-    """Where UGVs said a control period ago that they would be: exact, if they move as they are told.
+    """Positions that UGVs announced a control period ago: exact if they follow their commands.
 
     Ports (n UGVs, M bodies that move, world frame):
         in  `bodies` (3M) m; `ugv_command` (3n) m/s, held.
@@ -39,7 +40,7 @@ class Announcements(LeafSystem):
     """
 
     def __init__(self, world: World, period: float, late: float = 0.0, seed: int = 1) -> None:
-        """With a share `late` of samples, drawn by the seed, at which all have what was said a period before."""
+        """`late` is the share of samples, drawn by the seed, at which all have the announcements of a period before."""
         super().__init__()
         self._ugvs, self._period, size = world.select("ugv"), period, 3 * len(world.moving)
         self._late, self._seed = late, seed
@@ -123,7 +124,7 @@ class HearingUgvController(UgvController):
         self, i: int, known: Array, near: Neighbours, t: float, reference: Array, rate: Array,
         accepted: Sequence[Proposal | None], headings: Array | None, law: UgvLaw,
     ) -> Array:  # fmt: skip
-        """The command of UGV i, (3,), m/s, which knows bodies at (M, 3), m, by its row of all that is near."""
+        """The command of UGV i, (3,), m/s, from the positions that it knows, (M, 3), m, and its row of `near`."""
         row = slice(i, i + 1)
         near = near._replace(**{name: getattr(near, name)[row] for name in OF_ROBOTS})
         steering, motion = self._world.steering, accepted[i]
@@ -134,7 +135,7 @@ class HearingUgvController(UgvController):
 
 
 class AsynchronousUgvController(HearingUgvController):
-    """UGVs that act on the last positions of each other that arrived, each by the asynchronous law."""
+    """UGVs that act on the last received positions of each other, by the asynchronous law."""
 
     def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
         near, n = self._world.at(self._near, t), len(self._near.members)
@@ -155,7 +156,7 @@ class AsynchronousUgvController(HearingUgvController):
 
 
 class WaryUgvController(HearingUgvController):
-    """UGVs that stand where they lack a message, or leave out whom they know to be far."""
+    """UGVs that stand if they miss a message, or ignore UGVs that are certainly far."""
 
     def __init__(self, world: World, law: UgvLaw) -> None:
         super().__init__(world, law)
@@ -166,7 +167,7 @@ class WaryUgvController(HearingUgvController):
         self._speed, self._far = speed, _distances(self._near, n) + step[:, None] + step
 
     def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
-        """The law's commands; UGVs that lack a message stand, or leave out whom they know to be far."""
+        """The law's commands; UGVs that miss a message stand, or ignore UGVs that are certainly far."""
         velocity = super()._commanded(context, t, positions, *about)
         n = len(velocity)
         heard = self._heard.Eval(context).reshape(n, n)
@@ -180,7 +181,7 @@ class WaryUgvController(HearingUgvController):
         return velocity
 
     def _without(self, i: int, left_out: Flags, t: float, positions: Array, *about: Any) -> Array:
-        """The command of UGV i, (3,), m/s, by the law as if some UGVs were beyond its sensing range."""
+        """The law's command of UGV i, (3,), m/s, ignoring some UGVs."""
         known, members = positions.copy(), self._near.members
         known[members[left_out]] = known[members[i]] + [2.0 * self.avoidance.sensing_range, 0.0, 0.0]
         return self._alone(i, known, self._world.at(self._near, t), t, *about)
@@ -197,7 +198,7 @@ def _distances(near: Neighbours, n: int) -> Array:
 
 
 class Between(NamedTuple):
-    """What stands between the positions of robots and the controller of the UGVs."""
+    """The blocks between the positions of robots and the controller of the UGVs."""
 
     controller: UgvController
     parts: Mapping[str, LeafSystem]  # of the diagram, by name
@@ -207,7 +208,7 @@ class Between(NamedTuple):
 
 
 def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
-    """Positions as they are or as they are measured, and over the links between UGVs if there are any."""
+    """The positions for the controllers: true or measured ones, sent over the links between UGVs if there are any."""
     if scenario.asynchronous and scenario.channel and scenario.ugv_links:
         seed, loss = scenario.channel.seed, scenario.ugv_links.loss
         hearing = Hearing(world, seed, loss, scenario.control.period_s, scenario.late_samples)

@@ -84,7 +84,7 @@ def keep(state: State, index: int, value: Any) -> EventStatus:
 def declare_inbox(
     system: Any, count: int, state: set[Any], held: Callable[[Any, Context], Any], *, now: bool = False
 ) -> InputPort:
-    """Declare the ports of UGVs on a channel: in `inbox`; out `proposals`, those they hold, and `outbox`."""
+    """Declare the ports of UGVs with a channel: in `inbox`; out `proposals` (those held) and `outbox`."""
     # now: whether what has just arrived is answered before the state is updated
     inbox = system.DeclareAbstractInputPort("inbox", Value(()))
     needs = {*state, inbox.ticket()}

@@ -4,5 +4,6 @@
 
 `distributions.py` and `course.py` are pure functions of a draw's number, so that each draw can be repeated alone.
 `spec.py` reads the file, `work.py` does one draw, `pool.py` does many, on this machine or on a cluster. `store.py`
-keeps finished draws through kills. `statistics.py` and `evidence.py` conclude, `page.py` shows the conclusions.
+keeps finished draws even if processes are killed. `statistics.py` and `evidence.py` draw conclusions, which `page.py`
+shows.
 """

@@ -1,4 +1,4 @@
-"""A campaign from beginning to end: judge the draws that are not finished, store them, write the evidence."""
+"""A campaign from beginning to end: judge unfinished draws, store them, write the evidence."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
 
 @dataclass
 class Stopping:
-    """Stop when the probability of a violation is known to be below, or above, a value."""
+    """Stopping rule: the probability of a violation is known to be below, or above, a value."""
 
     claim: str  # identifier
     below: bool  # whether the upper bound must be below `value`; otherwise the lower bound must be above it
@@ -144,7 +144,7 @@ class Stopping:
         return bool(self._counts) and all(map(self._decides, self._counts))
 
     def met_in_order(self, index: int, rows: list[Row]) -> bool:
-        """Take one more finished draw; return whether the draws without a gap before them meet the rule."""
+        """Add a finished draw; return whether the draws up to the first unfinished one meet the rule."""
         self._waiting[index] = rows  # short draws finish first
         while self.last is None and self._next in self._waiting:
             if self.met(self._waiting.pop(self._next)):

@@ -104,7 +104,7 @@ class Course:
         return {"ugvs": ugvs, "obstacles": obstacles, **above}
 
     def _apart(self, rng: np.random.Generator, side: Array, least: float) -> Array:
-        """Draw places (n, 2), m, at these x; any two on the same side are at least that far apart."""
+        """Draw positions (n, 2), m, at these x; any two on the same side are at least `apart`, m, apart."""
         places: list[Array] = []
         for x in side:
             for _ in range(TRIES):

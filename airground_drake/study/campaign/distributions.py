@@ -77,7 +77,7 @@ class Key:
 
     @property
     def size(self) -> int:
-        """Number of shares that a value takes."""
+        """Number of shares that determine a value."""
         return int(np.size(self.given[0])) if self.kind in ("uniform", HALTON) else 1
 
     @property

@@ -39,7 +39,7 @@ class Counts(NamedTuple):
 
     @classmethod
     def of(cls, rows: pd.DataFrame, unfinished: int) -> Counts:
-        """Count the rows of one claim and run; `unfinished` more runs have no such row."""
+        """Count the rows of one claim and run; `unfinished` is the number of further runs without a row."""
         tested = _tested(rows)
         status = rows.loc[tested, "status"]
         refuted, undecided = int((status == "refuted").sum()), int(status.isin(UNDECIDED).sum())

@@ -59,7 +59,7 @@ class Most:
         return self.value(rows) < -self.limit
 
     def _of(self, row: Row) -> float:
-        """The value of a row. A UGV that does not arrive counts as LATEST_S."""
+        """The value of a row, LATEST_S for a UGV that does not arrive."""
         never = self.column == "arrival_s" and row["arrived"] < row["ugvs"]
         return LATEST_S if never else float(row[self.column])
 
@@ -81,7 +81,7 @@ class Search:
         return values_at(self.spec.drawn, point)
 
     def at(self, points: Array, k: int) -> tuple[float, bool]:
-        """The objective at one of some points (., n), and whether it is a counterexample."""
+        """The objective at a point, and whether it is a counterexample."""
         return self._judge(rows_at(self.spec, self.values(points[k]), 0, self.limits, self.engine))
 
     def fails(self, data: dict[str, Any]) -> bool:

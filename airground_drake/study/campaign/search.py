@@ -15,7 +15,7 @@ WORTHLESS = 1e6  # value of points without a measurement, for CMA-ES, which need
 
 @runtime_checkable
 class Sampler(Protocol):
-    """Chooses where to look next. It is made from a number of dimensions and a seed."""
+    """Chooses the next points of a search, given the number of dimensions and a seed."""
 
     def ask(self) -> Array:
         """Return the next points (k, n) in [0, 1)."""
@@ -34,7 +34,7 @@ class Uniform:
         return self._rng.random((BATCH, self._dimensions))
 
     def tell(self, points: Array, values: Array) -> None:
-        """Nothing is learnt."""
+        """Ignored."""
 
 
 class Halton(Uniform):
@@ -57,7 +57,7 @@ class CmaEs:
         self._begin()
 
     def ask(self) -> Array:
-        """Its next candidates. The strategy needs two dimensions: if there is only one, a second has no effect."""
+        """The next candidates. The strategy needs two dimensions; a missing second one is added without effect."""
         self._asked = self._strategy.ask()
         return np.clip(np.array(self._asked)[:, : self._dimensions], 0.0, np.nextafter(1.0, 0.0))
 

@@ -1,4 +1,4 @@
-"""Make a counterexample small: fewer policies, robots and obstacles, plainer shapes, less time, rounder numbers.
+"""Minimise a counterexample: fewer policies, robots and obstacles, simpler shapes, less time, rounder numbers.
 
 Greedy: each change is kept if the scenario is still valid and still fails, until no change is left.
 """
@@ -21,7 +21,7 @@ Fails = Callable[[Json], bool]  # whether a scenario is valid and fails, as befo
 
 
 def shrink(data: Json, fails: Fails, tests: int) -> tuple[Json, int]:
-    """Find a smaller scenario that fails, too. Returns the smallest scenario found, and the number of tests."""
+    """Find a smaller scenario that also fails. Returns the smallest one found, and the number of tests."""
     # tests: how often `fails` may be called.
     steps: list[Callable[[Json], Iterator[Json]]] = [partial(_without_entry, path=path) for path in PARTS]
     steps += [_plainer, _shorter, _rounder]
@@ -57,7 +57,7 @@ def _without_entry(data: Json, path: tuple[str, ...]) -> Iterator[Json]:
 
 
 def _charge(data: Json) -> None:
-    """Put UGVs in the charge of the first of several UAVs if they are in that of none that is left."""
+    """Assign UGVs of removed UAVs to the first remaining one of several."""
     uavs = [*data.get("uavs", {}).values()]
     for uav in uavs:
         uav["ugvs"] = [ugv for ugv in uav["ugvs"] if ugv in data["ugvs"]]
@@ -73,7 +73,7 @@ def _at(data: Any, path: tuple[str, ...]) -> Any:
 
 
 def _plainer(data: Json) -> Iterator[Json]:
-    """Leave out the arena, or an obstacle's corner, heading, radius, height or own distance."""
+    """Remove the arena, or an obstacle's corner, heading, radius, height or own distance."""
     if data["arena_m"]:
         yield copy.deepcopy(data) | {"arena_m": []}
     for name, obstacle in data["obstacles"].items():
@@ -87,7 +87,7 @@ def _plainer(data: Json) -> Iterator[Json]:
 
 
 def _shorter(data: Json) -> Iterator[Json]:
-    """End earlier by a share; at least one control period is left."""
+    """Shorten the duration by a share, to at least one control period."""
     for end in (share * data["duration_s"] for share in SHARES):
         if end >= data["control"]["period_s"]:
             yield copy.deepcopy(data) | {"duration_s": end}

@@ -116,11 +116,11 @@ class Spec(File):
 
     @property
     def swept(self) -> list[str]:
-        """Keys whose values are gone through in turn."""
+        """Keys with a `grid`."""
         return [key for key, drawn in self.drawn.items() if drawn.kind == GRID]
 
     def values(self, index: int) -> dict[str, Any]:
-        """The values of a draw by dotted key, without those of the course."""
+        """The drawn values by dotted key, without the course."""
         return values_of(self.drawn, self.seed, index)
 
     def draw(self, index: int) -> Scenario:
@@ -234,7 +234,7 @@ def _check_names(spec: Spec, document: Document) -> None:
 
 
 def _placed(error: ScenarioError, document: Document, part: str) -> ScenarioError:
-    """The error of an override, with the line of the spec that has this override."""
+    """The error of an override, with its line in the spec."""
     key = error.source.removeprefix("--set ").partition("=")[0]
     if (part, key) not in document.places:
         return error

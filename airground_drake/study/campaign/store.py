@@ -123,7 +123,7 @@ def _together(parts: Sequence[pd.DataFrame], lately: dict[int, list[Row]]) -> pd
 
 
 def _is_nothing(path: Path) -> bool:
-    """Whether a command may have left this file when it was killed before it wrote the manifest."""
+    """Whether this file may be left from a command killed before it wrote the manifest."""
     return files.is_partial(path) or (path.name == JOURNAL and path.lstat().st_size == 0)
 
 
@@ -207,7 +207,7 @@ def _plain(kind: type, value: Any) -> Any:
 
 
 def _as_written(path: Path, manifest: dict[str, Any], rows: Sequence[Any]) -> list[Row]:
-    """The rows of a draw; FolderError if they are not the rows that were written."""
+    """The rows of a draw; FolderError if they were changed."""
     sealed = _sealed(manifest, rows)
     if [row["digest"] for row in sealed] != [row["digest"] for row in rows]:
         raise _changed(path, rows[0]["index"])

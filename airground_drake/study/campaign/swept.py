@@ -1,4 +1,4 @@
-"""The runs of a campaign as one table, and what became of them by the value of a key that is swept."""
+"""The runs of a campaign as one table, and their results by the value of a swept key."""
 
 import json
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ def _plain(text: str) -> Json:
 
 
 def by_value(runs: pd.DataFrame, key: str) -> list[Json]:
-    """What became of the runs with each value of a key: an entry for each value and run, as strict JSON.
+    """Results of the runs for each value of a key: an entry for each value and run, as strict JSON.
 
     Args:
         runs: from `per_run`.

@@ -44,11 +44,11 @@ SHARE = 0.005  # of the runs that the loop made and nothing is wrong with, which
 
 
 class DrawOutOfTime(BaseException):
-    """A draw took too long. An Exception or an OutOfTime would count as a fault of a policy, so it is neither."""
+    """A draw took too long. It is a BaseException, because an Exception could count as a policy's fault."""
 
 
 class DifferenceError(AirgroundError):
-    """What must come to the same did not; it ends a campaign."""
+    """Two results that must agree differ; ends a campaign."""
 
 
 class EnginesDifferError(DifferenceError):
@@ -105,7 +105,7 @@ def rows_of_scenario(
 
 @contextmanager
 def _within(spec: Spec, scenario: Scenario, limits: Limits) -> Iterator[None]:
-    """Find or refuse third-party code; limit the time of the body."""
+    """Allow or refuse third-party code, and limit the time of the body."""
     within(scenario, limits)
     if not limits.plugins:
         plugins.refuse(scenario, spec.scenario)
@@ -141,7 +141,7 @@ class _Judged(NamedTuple):
 
 
 def _judged(scenario: Scenario, run: str, claims: Collection[str], index: int, engine: Engine) -> _Judged:
-    """A run by the loop, if it can and may, and by Drake where it is for Drake; screened, if that is enough."""
+    """A run by the loop if possible, otherwise by Drake; screened without a trace if that suffices."""
     try:
         if engine != BATCH:
             raise LeftToDrakeError
@@ -165,20 +165,20 @@ def _judged(scenario: Scenario, run: str, claims: Collection[str], index: int, e
 
 
 def _is_chosen(index: int, run: str) -> bool:
-    """Whether Drake makes a run of the loop again though nothing is wrong with it: a share of all, chosen by hash."""
+    """Whether Drake repeats a run without a failure: a share of all runs, chosen by hash."""
     told = hashlib.sha256(f"{index} {run}".encode()).digest()
     return int.from_bytes(told[:8]) < SHARE * 2**64
 
 
 def _is_failure(verdict: Verdict) -> bool:
-    """Whether Drake makes a run again for a verdict: it fails, and the scenario does not say that it may."""
+    """Whether Drake repeats a run because of an undeclared failure."""
     # A narrow margin is no reason. Array judges leave what they cannot tell to the judge of traces, whose verdicts are
     # about traces that are Drake's to the bit.
     return verdict.status not in (*PASSING, "not_run") and verdict.as_expected is False
 
 
 def _agree(screens: Sequence[Verdict], verdicts: Sequence[Verdict], trace: Trace) -> None:
-    """Raise a JudgesDifferError where an array judge came to something else than the judge of traces."""
+    """Raise a JudgesDifferError if an array judge and the trace judge disagree."""
     for ours, theirs in zip(screens, verdicts, strict=True) if screens else ():
         numbers = [float("nan") if verdict.margin is None else verdict.margin for verdict in (ours, theirs)]
         same = (ours.status, ours.exercised) == (theirs.status, theirs.exercised)
@@ -192,7 +192,7 @@ def _agree(screens: Sequence[Verdict], verdicts: Sequence[Verdict], trace: Trace
 
 
 def _compared(trace: Trace, by_drake: Trace) -> str:
-    """Who made a run, after a comparison bit by bit; raises EnginesDifferError."""
+    """The engine of a run, after a comparison bit by bit; raises EnginesDifferError."""
     from airground_drake.report.difference import first_difference  # slow to import, and rarely needed
 
     if any(OutOfTime.__name__ in fault["what"] for fault in by_drake.meta["faults"]):
@@ -225,7 +225,7 @@ def _of_claim(verdict: Verdict) -> Row:
 
 
 def screened(loop: Batch, made: Going, claims: Collection[str]) -> list[Verdict]:
-    """The verdicts of array judges on a run; none if a claim needs the judge of traces."""
+    """The verdicts of array judges on a run; empty if a claim needs the trace judge."""
     if not claims or not {*claims} <= {*array_judges.SCREENED}:
         return []
     try:
@@ -243,7 +243,7 @@ def screened(loop: Batch, made: Going, claims: Collection[str]) -> list[Verdict]
 
 @lru_cache(maxsize=1)
 def _judges(loop: Batch) -> ArrayJudges:
-    """The judges of a scenario's runs: other seeds have the same."""
+    """The array judges of a scenario's runs, which do not depend on the seed."""
     return ArrayJudges(loop)
 
 

@@ -1,4 +1,4 @@
-"""A run that stops at each request for a proposal, until it is given one."""
+"""A run that stops at each request for a proposal until the request is answered."""
 
 import copy
 from collections.abc import Callable
@@ -40,7 +40,7 @@ def with_agent(scenario: Scenario, run: str) -> Scenario:
 
 
 class ByDrake:
-    """A run under way in Drake's Simulator, as `sim.batch.run.Going` is one in the compiled loop."""
+    """A run in progress in Drake's Simulator, with the interface of `sim.batch.run.Going` for the compiled loop."""
 
     def __init__(self, recorder: Recorder, seed: int) -> None:
         self._recorder, self._seed = recorder, seed
@@ -63,12 +63,12 @@ class ByDrake:
         return bodies.reshape(-1, 3)[: len(model.world.robots)]
 
     def plan_ahead(self) -> None:
-        """Plan for this instant, before its updates, which then take this result; the last one counts."""
+        """Plan for this instant before its updates, which then use this result; the last call counts."""
         for planner in self._recorder.model.planners.values():
             planner.plan_ahead(planner.GetMyContextFromRoot(self._simulator.get_context()))
 
     def advance(self, until: float) -> None:
-        """Go on to a time, s; the updates of that instant are still to be made."""
+        """Advance to a time, s, before the updates of that instant."""
         self._recorder.advance(self._simulator, until)
 
     def trace(self) -> Trace:
@@ -155,7 +155,7 @@ class Episode:
         return self._run.trace()
 
     def _ask(self) -> None:
-        """Let the planner plan for this instant, to find out what it asks for; the run does not change."""
+        """Plan for this instant to collect the requests, without changing the run."""
         for agent in self.stage.agents:
             agent.chosen, agent.requests = self._chosen, {}
         self._run.plan_ahead()

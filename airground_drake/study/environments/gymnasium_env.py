@@ -112,7 +112,7 @@ class InterventionVectorEnv(gymnasium.vector.SyncVectorEnv):
         numbers: Sequence[int] | None = None,
         encoding: Encoding | None = None,
     ) -> None:
-        """How many, and arguments as of `Episodes`; ValueError if it is not at least one."""
+        """The number of environments, and arguments as in `Episodes`; ValueError if it is not positive."""
         if num_envs < 1:
             raise ValueError(f"num_envs is {num_envs!r}; allowed: a whole number from 1")
         first = InterventionEnv(given, run, numbers, encoding)

@@ -1,4 +1,4 @@
-"""A PettingZoo parallel environment: each UGV has an agent that proposes for it."""
+"""A PettingZoo parallel environment with an agent for each UGV."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -52,11 +52,11 @@ class TeamEnv(Episodes, ParallelEnv[str, Numbers, Numbers]):
         self._requests: dict[str, Observation] = {}
 
     def observation_space(self, agent: str) -> Box:
-        """That of an agent; all have the same."""
+        """The space of an agent, the same for all agents."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Box:
-        """That of an agent; all have the same."""
+        """The space of an agent, the same for all agents."""
         return self.action_spaces[agent]
 
     def reset(

@@ -1,4 +1,4 @@
-"""Where the episodes of an environment come from: one scenario, or the draws of a campaign; the present episode."""
+"""The source of an environment's episodes: one scenario, or the draws of a campaign."""
 
 import copy
 from collections.abc import Iterator, Mapping, Sequence
@@ -103,7 +103,7 @@ def _stage(given: Scenario | Spec, run: str, number: int) -> Stage:
 
 
 class Episodes:
-    """What both environments have in common: the present episode, and where it comes from.
+    """Code shared by both environments: the present episode and its source.
 
     Attributes:
         encoding: of observations and actions.
@@ -128,7 +128,7 @@ class Episodes:
         self._over = False
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Share where episodes come from, and copy the rest, as the present episode; TypeError if Drake makes it."""
+        """Share the source and copy the rest, including the present episode; TypeError if Drake makes it."""
         copied = copy.copy(self)
         memo[id(self)] = copied
         for name, value in vars(self).items():
@@ -142,11 +142,11 @@ class Episodes:
         return self._source.is_alone
 
     def beside(self) -> Self:
-        """Another environment that shares the models of this one; its episodes are its own."""
+        """Another environment with episodes of its own that shares the models of this one."""
         return copy.copy(self)
 
     def trace(self) -> Trace:
-        """What the episode has recorded until now, for `judge`.
+        """The trace of the episode until now, for `judge`.
 
         Raises:
             RuntimeError: before `reset`.
@@ -190,7 +190,7 @@ def _chosen(scenario: Scenario, run: str | None) -> str:
 
 @contextmanager
 def needed() -> Iterator[None]:
-    """In the body, a package that is missing is named with the extra that brings it."""
+    """Convert an ImportError of the body to a message that names the missing extra."""
     try:
         yield
     except ModuleNotFoundError as error:

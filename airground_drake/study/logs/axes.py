@@ -1,4 +1,4 @@
-"""Axes of a log. A scenario's x and y are in the plane, and z is up; other axes are recognised, or asked for."""
+"""Axes of a log. In a scenario z is up; other axes are recognised, or the command asks for them."""
 
 import re
 from collections.abc import Collection, Iterable, Mapping
@@ -35,7 +35,7 @@ def parsed(text: str) -> list[tuple[int, float]]:
 
 
 def chosen(streams: Mapping[str, Stream], choice: Mapping[str, str]) -> None:
-    """Turn positions as the command line says, by body; '' is for all others."""
+    """Convert positions to the axes of the command line, by body; '' is for all others."""
     for name, stream in streams.items():
         _turn(stream, choice.get(name, choice.get("", PLAIN)))
 
@@ -52,7 +52,7 @@ def _turned(places: Array, axes: str) -> Array:
 
 
 def recognised(streams: Mapping[str, Stream], scenario: Json, without: Collection[str]) -> list[str]:
-    """Turn positions that are named as NED and then begin where the scenario has them; remarks."""
+    """Convert positions named as NED if they then begin at the scenario's starts; returns remarks."""
     robots = {name: stream for name, stream in streams.items() if name in robots_of(scenario) and name not in without}
     robots = {name: stream for name, stream in robots.items() if len(stream.whole)}
     if not robots or _fits(robots, scenario, PLAIN):
@@ -79,7 +79,7 @@ def recognised(streams: Mapping[str, Stream], scenario: Json, without: Collectio
 
 
 def _ask(robots: Mapping[str, Stream], scenario: Json, why: str, likely: Iterable[str]) -> None:
-    """Raise LogError if there is a reason to ask; the axes with which the robots begin at their starts come first."""
+    """Raise LogError if the axes are unclear, suggesting first those that match the robots' starts."""
     if why:
         first = sorted(likely, key=lambda axes: not _fits(robots, scenario, axes))[0]
         begins = ", with which they begin at their starts," if _fits(robots, scenario, first) else ""
@@ -89,7 +89,7 @@ def _ask(robots: Mapping[str, Stream], scenario: Json, why: str, likely: Iterabl
 
 
 def _fits(robots: Mapping[str, Stream], scenario: Json, axes: str) -> bool:
-    """Whether robots begin where the scenario has them, some of them far enough from (0, 0) to tell axes apart."""
+    """Whether robots begin at the scenario's starts, some far enough from (0, 0) to distinguish axes."""
     starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2], dtype=np.float64) for name in robots}
     if max((float(np.linalg.norm(start)) for start in starts.values()), default=0.0) < APART_M:
         return False
@@ -100,7 +100,7 @@ def _fits(robots: Mapping[str, Stream], scenario: Json, axes: str) -> bool:
 
 
 def _below(robots: Mapping[str, Stream], scenario: Json) -> str:
-    """What flies below the ground, in words; '' if nothing does."""
+    """The robots that fly below the ground, in words; '' without any."""
     for name, stream in robots.items():
         heights = stream.places[:, 2] / PER_M[stream.length_unit]
         if name not in scenario["ugvs"] and np.isfinite(heights).any() and np.nanmedian(heights) < -BELOW_M:
@@ -109,7 +109,7 @@ def _below(robots: Mapping[str, Stream], scenario: Json) -> str:
 
 
 def _level(robots: Mapping[str, Stream], scenario: Json) -> str:
-    """Why y may be the height of what drives on the ground, in words; '' if it is not."""
+    """Why y may be the height of ground robots, in words; '' if it is not."""
     ugvs = [stream for name, stream in robots.items() if name in scenario["ugvs"]]
     heights = [stream.places[:, 1:] / PER_M[stream.length_unit] for stream in ugvs]  # if y, or z, is the height
     if not ugvs or not np.isfinite(np.concatenate(heights)).all():

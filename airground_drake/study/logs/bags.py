@@ -1,4 +1,4 @@
-"""MCAP files and ROS bags. The packages that read them are extras: where one is missing, one line names it."""
+"""MCAP files and ROS bags. Their readers are optional packages; an error names a missing one."""
 
 import bz2
 import io
@@ -29,7 +29,7 @@ Decode = Callable[[bytes], Any]
 
 
 class Channel(NamedTuple):
-    """What messages are alike: their topic, the name of their type, their encoding, and its definition."""
+    """A group of messages: topic, type name, encoding, and type definition."""
 
     topic: str
     kind: str
@@ -42,19 +42,19 @@ Message = tuple[Channel, int, bytes]  # its channel, when it was received, ns, a
 
 
 class Unpacker:
-    """Unpacks parts of a file of a stranger, up to a limit for each part and for all of them."""
+    """Unpacks parts of an untrusted file, up to a limit for each part and for all of them."""
 
     def __init__(self, size: int) -> None:
         self.left = max(files.MOST_UNPACKED, DENSEST * size)
 
     def unpacked(self, data: bytes, how: str) -> bytes:
-        """The content of a part, packed by zstd, lz4 or bz2; LogError if it is too large, or of another kind."""
+        """The content of a part compressed by zstd, lz4 or bz2; LogError if it is too large or damaged."""
         out = io.BytesIO()
         self.copy(io.BytesIO(data), how, out, files.LARGEST_FILE)
         return out.getvalue()
 
     def copy(self, packed: BinaryIO, how: str, out: BinaryIO, most: int) -> None:
-        """Unpack from one file to another, at most so many bytes; LogError as `unpacked`."""
+        """Unpack from one file to another, up to a limit; LogError as in `unpacked`."""
         most, count = min(most, self.left), 0
         source = _unpacking(packed, how)
         while block := source.read(BLOCK):
@@ -137,7 +137,7 @@ def _of_mcap(file: BinaryIO) -> Iterator[Message]:
 
 
 def _gather(messages: Iterator[Message], gathered: Gathered, size: int) -> None:
-    """Take the places of messages. What cannot be decoded of a channel is named, and loses no other channel."""
+    """Collect the positions in messages. Channels that cannot be decoded are named and skipped."""
     # size: bytes
     decoders, unpacker = dict[Channel, Decode | None](), Unpacker(size)
     for channel, received_ns, data in messages:
@@ -162,7 +162,7 @@ def _gather(messages: Iterator[Message], gathered: Gathered, size: int) -> None:
 
 
 def _decoder(channel: Channel) -> Decode | None:
-    """What decodes the messages of a channel; None if nothing does."""
+    """The decoder of a channel; None if there is none."""
     if channel.encoding == "json":
         return json.loads
     if channel.encoding == "protobuf":
@@ -179,7 +179,7 @@ def _decoder(channel: Channel) -> Decode | None:
 
 
 def _of_ros(channel: Channel) -> Decode:
-    """Decode a message of ROS by the definition in the file, with types that it lacks from the distribution."""
+    """Decode a ROS message by the definition in the file, completed by the distribution's types."""
     typesys = _typesys()
     kind, is_ros1 = channel.kind, channel.encoding == "ros1"
     name, known = kind if "/msg/" in kind else kind.replace("/", "/msg/", 1), {}

@@ -1,4 +1,4 @@
-"""What the columns of a table mean: time, body, frame, and the places of one or more bodies."""
+"""The meaning of a table's columns: time, body, frame, and positions of one or more bodies."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _REST = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"]
 
 
 class Time(NamedTuple):
-    """A column of stamps; `rest` is that of nanoseconds, if `whole` has seconds."""
+    """A column of stamps; `rest` is the column of nanoseconds if `whole` has seconds."""
 
     whole: int
     rest: int | None
@@ -72,7 +72,7 @@ class Place(NamedTuple):
 
     @property
     def is_position(self) -> bool:
-        """Whether its name says so, or nothing else."""
+        """Whether its name says that it is a position, or says nothing."""
         return re.split(r"[^a-z]+", self.name.lower())[-1] in _POSITIONS
 
 
@@ -86,7 +86,7 @@ class Columns(NamedTuple):
     chosen: dict[int, str]
 
     def refuse_unused(self, used: Collection[int | None]) -> None:
-        """Raise LogError for what `--map-columns` says if it has no effect: `used` are the columns that are used."""
+        """Raise LogError for a column named by `--map-columns` that is not among the `used` ones."""
         by_choice: dict[str, list[int]] = {}
         for k, said in self.chosen.items():
             by_choice.setdefault(said, []).append(k)
@@ -127,7 +127,7 @@ def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection
 
 
 def clock_of(place: Place, times: Sequence[Time], labels: Sequence[str]) -> Time:
-    """The stamps of a place: its own; of several columns with one name, the last before it."""
+    """The stamps of a position: its own, or of several columns with one name, the last before it."""
     own = next((time for time in times if time.is_of(place) or not place.name), None)
     if own is None:
         named = listed([labels[time.whole] for time in times])
@@ -160,7 +160,7 @@ def counts_frames(label: str) -> bool:
 
 
 def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str], dict[int, str]]:
-    """The labels, with the usual ones where `--map-columns` names them, and what it says of these, by number."""
+    """The labels, with standard ones for columns named by `--map-columns`, and these by number."""
     renamed, mapped = list(labels), dict[int, str]()
     for target, pattern in chosen.items():
         names = [re.escape(part) for part in pattern.split("{body}")]
@@ -188,7 +188,7 @@ def _named(labels: Sequence[str], names: Sequence[str]) -> int | None:
 
 
 def _times(labels: Sequence[str], names: Collection[str]) -> list[Time]:
-    """Stamps of headers, then others, dates, and times of receipt; `names` are those of places and bodies."""
+    """Time columns in order: header stamps, others, dates, times of receipt; `names` of positions and bodies."""
     times, rests = [], set[int]()
     low = [label.lower() for label in labels]
     for k, label in enumerate(low):
@@ -212,7 +212,7 @@ def _times(labels: Sequence[str], names: Collection[str]) -> list[Time]:
 
 
 def _owner(label: str, names: Collection[str]) -> tuple[str, str]:
-    """The beginning of the columns that stamps belong to, '' for all, and their own name in small letters."""
+    """The prefix of the columns that stamps belong to, '' for all, and their name in lower case."""
     # That is what stands before `header`, or before the last part if places or bodies have that name: `a.t`, `a_t`.
     base = split_unit(label)[0]
     if re.search(r"header[/._]", label):

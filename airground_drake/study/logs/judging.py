@@ -1,9 +1,12 @@
-"""Tracks judged by a scenario: the distances that were kept, and the avoidance law, interval by interval.
+"""Judges tracks by a scenario: distances, and the avoidance law in each interval.
 
-Between two samples motion is taken as straight; in the gaps of a track nothing is claimed. An interval is the time
-between two instants at which one of a pair was sampled. The law is asked for in steps instead of velocities, so that
-each interval counts with its own length h: n.(own step - other's step) >= A h (d - D) if D <= d, else >= d - D. Where
-it lacks e_k, the deficit below d obeys deficit <= (1 - A h) deficit + e_k, by the induction of the safety theorem.
+Motion between two samples is assumed to be straight; gaps of a track are not judged. An interval is the time between
+two sampling instants of a pair. The law is written with steps instead of velocities, with each interval's own length h:
+
+    n.(own step - other's step) >= A h (d - D) if D <= d, else >= d - D.
+
+If interval k violates it by e_k, the deficit below d obeys deficit <= (1 - A h) deficit + e_k, by the induction of the
+safety theorem.
 """
 
 import math
@@ -53,7 +56,7 @@ NOT_JUDGED_OF_OLD = "what UGVs had heard of each other: the law judged between t
 
 
 class JudgedPair(NamedTuple):
-    """What was found about a pair; distances are between surfaces, below 0 they overlap."""
+    """The results for a pair; distances are between surfaces, below 0 they overlap."""
 
     first: str  # a robot
     second: str  # an obstacle, or another robot
@@ -91,7 +94,7 @@ class JudgedPair(NamedTuple):
 
     @property
     def margin_m(self) -> float:
-        """By how much the least distance is above the one required."""
+        """The least distance minus the required one."""
         return self.least_m - self.safe_m
 
     @property
@@ -104,12 +107,12 @@ class JudgedPair(NamedTuple):
 
     @property
     def passive(self) -> bool:
-        """Whether the other may move by itself."""
+        """Whether the other body is an obstacle that may move."""
         return self.theorem == "Passive"
 
 
 class Judged(NamedTuple):
-    """What was found about a log."""
+    """The results for a log."""
 
     pairs: list[JudgedPair]  # the least margin first
     begin_s: float  # first time in the log
@@ -186,7 +189,7 @@ def courses(tracks: Tracks, scenario: Json) -> dict[tuple[str, str], list[tuple[
 
 
 def _tracked(bodies: Mapping[str, Track], scenario: Json, whole: Span) -> Iterator[tuple[Pair, Track, Track]]:
-    """Each pair with its tracks; that of an obstacle is cut to the time for which it is there."""
+    """Each pair with its tracks; an obstacle's track is cut to the time during which it exists."""
     resting, barriers = places_of(scenario, np.zeros(1)), barriers_of(scenario)
     for pair in _pairs(scenario, bodies):
         there = _there(barriers[pair.other], whole) if pair.other in barriers else whole
@@ -214,7 +217,7 @@ def _pairs(scenario: Json, bodies: Mapping[str, Track]) -> list[Pair]:
 
 
 def _seen(track: Track, name: str, pair: Pair, scenario: Json) -> Track:
-    """A track as a pair is judged: UGVs among themselves and obstacles are in the plane, at the scenario's heights."""
+    """A track for judging a pair: for pairs of UGVs and obstacles, in the plane at the scenario's heights."""
     flat = pair.robot in scenario["ugvs"] and (pair.other in scenario["ugvs"] or pair.other in barriers_of(scenario))
     is_obstacle = name in scenario["obstacles"]
     if not (flat or is_obstacle):
@@ -227,7 +230,7 @@ def _seen(track: Track, name: str, pair: Pair, scenario: Json) -> Track:
 
 
 def _there(body: Json, whole: Span) -> Span:
-    """When an obstacle is there, in a log that begins with the scenario."""
+    """The time span in which an obstacle exists, for a log that begins with the scenario."""
     return Span(max(whole.begin, float(body["appears_s"])), min(whole.end, float(body["disappears_s"]) or np.inf))
 
 
@@ -244,7 +247,7 @@ def _knots(own: Track, other: Track, span: Span) -> Array:
 def _judged(
     pair: Pair, own: Track, other: Track, scenario: Json, errors_m: Mapping[str, float], whole: Span
 ) -> JudgedPair | None:
-    """What is found about a pair; None beside an obstacle that is absent during the whole log."""
+    """The results for a pair; None if the obstacle does not exist during the log."""
     if not len(other.t_s):
         return None
     eps = errors_m.get(pair.robot, 0.0) + errors_m.get(pair.other, 0.0)  # a body that is not in the log has no error
@@ -306,7 +309,7 @@ class _Law:
         self.starts, self.starts_s = np.inf, 0.0
 
     def add(self, t_s: Array, own_m: Array, other_m: Array) -> None:
-        """Judge the intervals of a stretch; beside what may move, d + V h stands for d, without a gain."""
+        """Judge the intervals of a stretch; beside obstacles that may move, with d + V h for d and without a gain."""
         pair, h = self.pair, np.diff(t_s)
         moves = pair.moves_m_s > 0.0
         start = pair.shape.least_m(own_m[:1] - other_m[:1])
@@ -347,7 +350,7 @@ def _least(shape: Shape, apart: Array, t_s: Array) -> tuple[float, float]:
 
 
 def _lowest(shape: Shape, start: Array, end: Array) -> float:
-    """The share of a step at which it is nearest."""
+    """The share of a step with the least distance."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         early, late = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
@@ -383,7 +386,7 @@ def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
 
 
 def _gaps(spans: list[Span], whole: Span, own: Track, other: Track) -> list[Span]:
-    """Stretches between those in which both were recorded; at the ends only where one lacks more than is usual."""
+    """Gaps between stretches with both bodies recorded, and at the ends if longer than usual."""
     edges = [whole.begin, *(edge for span in spans for edge in span), whole.end]
     gaps = [Span(*both) for both in zip(edges[::2], edges[1::2], strict=True)]
     inner = [gap for gap in gaps[1:-1] if gap.end > gap.begin]
@@ -393,7 +396,7 @@ def _gaps(spans: list[Span], whole: Span, own: Track, other: Track) -> list[Span
 
 
 def _came(pair: Pair, own: Track, other: Track, span: Span) -> dict[str, float]:
-    """By how much each of a pair came nearer to the other: the change of the distance, told apart by who moved."""
+    """The change of the distance due to each body's own motion."""
     t_s = np.linspace(span.begin, span.end, STEPS + 1)
     own_m, other_m = own.at(t_s), other.at(t_s)
     mixed = {(i, j): _signed(pair.shape, own_m[i : len(own_m) - 1 + i] - other_m[j : len(other_m) - 1 + j])
@@ -404,7 +407,7 @@ def _came(pair: Pair, own: Track, other: Track, span: Span) -> dict[str, float]:
 
 
 def _too_fast(other: Track, scenario: Json, pair: Pair, error_m: float) -> float:
-    """Largest speed of an obstacle, if it is above the declared one for certain, m/s; else 0."""
+    """Largest speed of an obstacle, m/s, if it certainly exceeds the declared one; else 0."""
     if pair.other not in scenario["obstacles"]:
         return 0.0
     moved, lasts = _moved(other)
@@ -419,7 +422,7 @@ def _speed(track: Track) -> float:
 
 
 def _moved(track: Track) -> tuple[Array, Array]:
-    """How far a body is from each sample at a later one, m, and how much later that is, s; not across a gap."""
+    """Displacements from each sample to a later one, m, and the time between them, s; not across gaps."""
     # That is half the usual time at least: of samples that are nanoseconds apart, rounding makes up any speed.
     t_s, n = track.t_s, len(track.t_s)
     later = np.searchsorted(t_s, t_s + 0.5 * track.usual_s, side="left")
@@ -432,7 +435,7 @@ def _moved(track: Track) -> tuple[Array, Array]:
 
 
 def _longest(track: Track) -> float:
-    """Longest time between samples without a gap, s; 0 for what stands."""
+    """Longest sampling interval without a gap, s; 0 for a static body."""
     return float(np.diff(track.t_s)[track.is_known].max(initial=0.0)) if np.isfinite(track.gap_s) else 0.0
 
 

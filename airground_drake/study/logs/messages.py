@@ -88,7 +88,7 @@ def _xyz(point: Any) -> tuple[float, float, float] | None:
 
 
 def _ns(stamp: Any) -> int | None:
-    """A stamp of a header in nanoseconds, also as a number or a date; 0 means that none was set."""
+    """A header's stamp in nanoseconds, also from a number or a date; 0 counts as unset."""
     if isinstance(stamp, str):
         try:
             return int(pd.Timestamp(stamp).as_unit("ns").value) or None
@@ -111,7 +111,7 @@ def _in_64_bits(ns: int) -> int | None:
 
 
 class Gathered:
-    """Collects the places of messages, a stream for each topic, body, frame and child frame."""
+    """Collects positions in messages: a stream for each topic, body, frame and child frame."""
 
     def __init__(self, source: str, bodies: tuple[str, ...]) -> None:
         self.source, self.bodies = source, bodies
@@ -128,7 +128,7 @@ class Gathered:
         return topic not in self.unused
 
     def add(self, topic: str, kind: str, received_ns: int, message: Any) -> None:
-        """Take the places of a message; a topic whose first message has no place is unused."""
+        """Collect the positions of a message; a topic whose first message has none is unused."""
         several = list(places(message))
         if not several and topic not in self.used:
             self.unused[topic] = kind
@@ -173,5 +173,5 @@ class Gathered:
             yield stream
 
     def ignored(self) -> list[str]:
-        """What is said of topics that were not used."""
+        """Descriptions of the unused topics."""
         return [f"{topic} ({kind})" for topic, kind in sorted(self.unused.items())]

@@ -1,4 +1,4 @@
-"""What a file of a log is, by its content; its streams."""
+"""Detects the format of a log's file by its content, and reads its streams."""
 
 import stat
 from collections.abc import Sequence
@@ -73,7 +73,7 @@ def _read(path: Path, wanted: Wanted) -> Log:
 
 
 def _unpacked(path: Path, wanted: Wanted) -> Log:
-    """The streams of a file that zstd has packed, as ROS 2 does with whole recordings; packed twice, it is refused."""
+    """The streams of a file compressed by zstd, as whole ROS 2 recordings; double compression is refused."""
     with files.temporary_folder() as folder:
         inner = folder / path.stem
         with inner.open("wb") as out:

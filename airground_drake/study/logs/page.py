@@ -1,4 +1,4 @@
-"""A judged log as a page like a report's: verdict, map, distances over time, what holds for each pair; a replay."""
+"""A judged log as a page: verdict, map, distances over time, results of each pair; and a replay."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -95,7 +95,7 @@ def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
 
 
 def _parts(track: Track) -> list[Array]:
-    """Its way in each stretch, seen from above: (K, 2) each, m, with few enough points to draw."""
+    """Its path in each stretch, seen from above: (K, 2) each, m, thinned for drawing."""
     parts = [track.places_m[(track.t_s >= span.begin) & (track.t_s <= span.end), :2] for span in track.spans]
     return [part[canvas.thin(part)] for part in parts]
 

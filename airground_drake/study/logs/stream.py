@@ -1,4 +1,4 @@
-"""A stream: positions that one source has of one body, as they are written there."""
+"""A stream: unconverted positions of one body from one source."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ELSEWHERE = {
 
 
 def unit_since_1970(least: float, largest: float) -> str:
-    """The unit in which numbers, as times since 1970, are in the years 2000 to 2100; '' if no unit fits."""
+    """The unit in which numbers are Unix times of the years 2000 to 2100; '' if no unit fits."""
     return next((unit for unit, per in PER_S.items() if YEAR_2000_S <= least / per <= largest / per <= YEAR_2100_S), "")
 
 
@@ -60,7 +60,7 @@ class Stream:
 
     @property
     def label(self) -> str:
-        """How messages name it."""
+        """Its name in messages."""
         return f"{self.name} ({self.child})" if self.child and self.child != self.name else self.name
 
     def ns(self, unit: str) -> Whole:
@@ -78,7 +78,7 @@ class Stream:
 
 @dataclass(eq=False)
 class Log:
-    """What the files of a log have."""
+    """The content of a log's files."""
 
     streams: list[Stream] = field(default_factory=list)  # that may be about bodies
     # What was not used, and why: columns, topics, files; each as it is said.
@@ -97,7 +97,7 @@ def segments(name: str) -> list[str]:
 
 
 def is_elsewhere(name: str, bodies: Collection[str]) -> bool:
-    """Whether a name says that it is not about where a body is: a goal, a velocity. Names of bodies do not count."""
+    """Whether a name, apart from names of bodies, denotes something else than a position, such as a goal."""
     words = (
         word for segment in segments(name) if segment not in bodies for word in re.split(r"[^A-Za-z]+", segment.lower())
     )
@@ -120,6 +120,6 @@ def body_of(name: str, bodies: Collection[str], *, is_file: bool = False) -> str
 
 
 def renamed(names: Iterable[str], rename: Mapping[str, str]) -> str:
-    """The body that `--rename` gives to the first of some names, or ''; a slash at the ends does not count."""
+    """The body that `--rename` assigns to the first of some names, or ''; outer slashes are ignored."""
     known = {key.strip("/"): body for key, body in rename.items()}
     return next((known[name.strip("/")] for name in names if name.strip("/") in known), "")

@@ -29,7 +29,7 @@ _DECIMAL = re.compile(r"([+-]?)(\d{1,19})(?:\.(\d*))?")
 
 
 class Wanted(NamedTuple):
-    """What the scenario and the command line say about names."""
+    """Names given by the scenario and the command line."""
 
     bodies: Collection[str]  # names of the scenario
     rename: Mapping[str, str]  # bodies by names in the log
@@ -87,13 +87,13 @@ def _is_echo(table: text.Table) -> bool:
 
 
 def _has_turns(table: text.Table) -> bool:
-    """Whether the last four columns of most rows are a quaternion of length 1, as those of TUM are."""
+    """Whether the last four columns of most rows are a unit quaternion, as in TUM files."""
     numbers = table.cells.iloc[:, -4:].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
     return bool((np.abs(np.linalg.norm(numbers, axis=1) - 1.0) <= UNIT_LENGTH).mean() > 0.5)
 
 
 def _frames(table: text.Table, has: Columns) -> pd.Series | None:
-    """The coordinate frames of the rows; None without a column of them, or if that has the numbers of frames."""
+    """The coordinate frames of the rows; None without such a column, or if it has frame numbers."""
     cells = table.cells[has.frame] if has.frame is not None else None
     return None if cells is None or all(text.is_number(cell) for cell in cells.unique()[:100]) else cells
 
@@ -116,7 +116,7 @@ def _written(value: Any) -> str:
 
 
 def _file_of(path: Path, wanted: Wanted) -> str:
-    """The name of a file that is about one body: its stem, or its folder's name if only that names a body."""
+    """The name of a single-body file: its stem, or its folder's name if only that names a body."""
     by_folder = wanted.body(path.parent.name) and not wanted.body(path.stem, is_file=True)
     return path.parent.name if by_folder else path.stem
 
@@ -196,7 +196,7 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
 
 
 def _stream(raw: Stream, why: npt.NDArray[np.object_], lines: list[int], *, is_sparse: bool) -> Stream:
-    """A stream without the rows that cannot be used; it counts them, but not the empty ones between other bodies'."""
+    """A stream without unusable rows, which it counts, except for empty rows between those of other bodies."""
     good = why == ""
     for k in np.flatnonzero(~good).tolist():
         if is_sparse and why[k] == "empty":
@@ -208,7 +208,7 @@ def _stream(raw: Stream, why: npt.NDArray[np.object_], lines: list[int], *, is_s
 
 
 def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.object_]]:
-    """Coordinates (n, 3), in the unit of x, and why a row lacks them, else ''."""
+    """Coordinates (n, 3), in the unit of x, and the reason for each row without them, else ''."""
     if not all(place.units) and any(place.units):
         named = listed([table.labels[k] for k in (place.x, place.y, place.z) if k is not None])
         raise LogError(f"some of the columns {named} have a unit, others not; wanted: one for each, or none")
@@ -251,7 +251,7 @@ def _stamps(table: text.Table, time: Time) -> tuple[Whole, Whole, Flags]:
 
 
 def _exactly(cells: list[str]) -> tuple[Whole, Whole, Flags]:
-    """Decimal numbers as whole parts and billionths, exactly; other numbers as near as floating point has them."""
+    """Numbers as whole parts and billionths: exact for decimal text, rounded for floats."""
     whole, nano = np.zeros(len(cells), dtype=np.int64), np.zeros(len(cells), dtype=np.int64)
     good = np.zeros(len(cells), dtype=bool)
     for k, cell in enumerate(cells):

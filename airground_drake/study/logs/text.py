@@ -1,6 +1,6 @@
-"""Text tables as loggers write them: the delimiter, the header and the sign of decimals are found from the data lines.
+"""Text tables of loggers: delimiter, header and decimal sign are detected from the data lines.
 
-Guessing from the first lines goes wrong where a header of several lines, or comments, stand above the data.
+Detection from the first lines would fail with headers of several lines, or with comments above the data.
 """
 
 import csv
@@ -128,7 +128,7 @@ def _count(line: str, delimiter: str) -> int:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell is a number, nothing, or not a number by name (nan)."""
+    """Whether a cell is a number, empty or nan."""
     return _NUMBER.fullmatch(cell) is not None
 
 
@@ -149,7 +149,7 @@ def _decimal_comma(column: Sequence[str]) -> bool:
 
 
 def _is_data(row: Sequence[str], numeric: Sequence[bool]) -> bool:
-    """Whether a line has numbers, or nothing, where most lines have numbers."""
+    """Whether a line has numbers or empty cells where most lines have numbers."""
     cells = [cell for cell, is_numeric in zip(row, numeric, strict=False) if is_numeric]
     return len(row) == len(numeric) and all(map(is_number, cells)) and any(cells)
 

@@ -89,7 +89,7 @@ class Tracks:
 
 
 class Choice(NamedTuple):
-    """What the command line chooses."""
+    """Choices of the command line."""
 
     rename: Mapping[str, str] = {}  # bodies by names in the log
     # Positions in other frames are not used, and these count as one; none: all that are there.
@@ -105,7 +105,7 @@ class Choice(NamedTuple):
 
 
 def bodies_of(scenario: Json, uavs: Sequence[str] = ()) -> list[str]:
-    """Names of the bodies that a log may have: robots, further UAVs, and obstacles that move or might."""
+    """Names of possible bodies of a log: robots, further UAVs, and obstacles that may move."""
     movers = (name for name, obstacle in scenario["obstacles"].items() if expected_m_s(obstacle))
     return [*robots_of(scenario), *uavs, *movers]
 
@@ -240,7 +240,7 @@ def _body_of(stream: Stream, bodies: Collection[str], rename: Mapping[str, str])
 
 
 def _links(streams: list[Stream]) -> list[Stream]:
-    """Streams without those of a robot's own parts: their frame is one that the robot carries."""
+    """Streams without those of a robot's own parts, whose frame is carried by the robot."""
     carried = {stream.child for stream in streams if stream.child}
     return [stream for stream in streams if stream.frame not in carried or stream.frame == stream.child] or streams
 
@@ -258,7 +258,7 @@ def _merged(streams: list[Stream]) -> Stream:
 
 
 def _in_one_frame(frames: Mapping[str, str], allowed: Collection[str]) -> None:
-    """Refuse positions in different frames, and frames of odometry, which begin where each robot stood."""
+    """Refuse positions in different frames, and odometry frames, which start at each robot's own pose."""
     stated = {name: frame for name, frame in frames.items() if frame}
     several = ", ".join(f"{name} in {frame or 'no named frame'}" for name, frame in frames.items())
     if allowed:
@@ -282,7 +282,7 @@ _USABLE = "seconds, or dates such as 2026-05-04T10:00:00.050Z, and numbers for x
 
 
 def _fastest(name: str, scenario: Json) -> float:
-    """A speed that a body does not exceed by far: its limit; of an obstacle, that of the fastest body, m/s."""
+    """The plausible speed of a body, m/s: its limit, or for an obstacle the fastest body's."""
     limits = {ugv: float(robot["max_speed_m_s"]) for ugv, robot in robots_of(scenario).items()}
     expected = expected_m_s(scenario["obstacles"][name]) if name in scenario["obstacles"] else 0.0
     return limits.get(name, max(expected, *limits.values()))
@@ -370,7 +370,7 @@ def _leaps(t_s: Array, places: Array, fastest_m_s: float) -> Flags:
 
 
 def _lost(t_s: Array, places: Array, fastest_m_s: float, start: Array | None) -> Flags:
-    """Which rows are where the body cannot have been, (n,)."""
+    """Which rows have impossible positions, (n,)."""
     # They are between two leaps, fewer than the rows on either side or as few and at (0, 0), and the body can have gone
     # from one side to the other. At either end of the log they are at (0, 0), unless the body starts there.
     kept = np.arange(len(t_s))
@@ -395,7 +395,7 @@ def _lost(t_s: Array, places: Array, fastest_m_s: float, start: Array | None) ->
 
 
 def _apart_at_the_start(tracks: Mapping[str, Track], scenario: Json) -> None:
-    """Refuse robots that all start at (0, 0), where the scenario has them start apart."""
+    """Refuse robots that all start at (0, 0), if the scenario's starts differ."""
     ugvs = scenario["ugvs"]
     there = [name for name in ugvs if name in tracks and np.abs(tracks[name].places_m[0, :2]).max() <= ORIGIN_M]
     starts = {tuple(ugvs[name]["start_m"][:2]) for name in there}

@@ -1,4 +1,4 @@
-"""Units that a log leaves open, from what it says: stamps since 1970, and motion that the scenario makes impossible."""
+"""Units that a log does not state, inferred from Unix times and from motion that the scenario makes impossible."""
 
 import math
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ NAMES = {
 
 
 class _Motion(NamedTuple):
-    """A log in units of time and length, as shares of what the scenario says; and what is farthest from that."""
+    """A log in some units relative to the scenario's duration, speeds and distances, with the most extreme body."""
 
     lasting: float
     speed: float
@@ -38,7 +38,7 @@ class _Motion(NamedTuple):
 
     @property
     def is_possible(self) -> bool:
-        """Whether a log can last so long, and robots can be so fast."""
+        """Whether duration, speeds and distances are plausible."""
         return max(self.lasting, self.speed) <= IMPOSSIBLE
 
     @property
@@ -50,7 +50,7 @@ class _Motion(NamedTuple):
 def settle(
     streams: Mapping[str, Stream], scenario: Json, time_unit: str = "", length_unit: str = "", rate_hz: float = 0.0
 ) -> list[str]:
-    """Give every stream its units, and say which ones were not seconds and metres."""
+    """Set the units of every stream; returns remarks on other units than seconds and metres."""
     # time_unit: of streams that do not say theirs; '' to find out.
     # length_unit: of streams that do not say theirs; '' to find out.
     # rate_hz: frames per second of streams whose times are numbers of frames; 0 without such streams.
@@ -100,7 +100,7 @@ def _of_frames(streams: Mapping[str, Stream], rate_hz: float) -> None:
 
 
 def _alike(streams: Mapping[str, Stream], length: str, scenario: Json) -> None:
-    """Refuse a stream that begins where its body starts if it is in metres, where all are taken as in another unit."""
+    """Refuse a stream that matches its body's start in metres if the others are in another unit."""
     for name, stream in streams.items():
         start = np.array(robots_of(scenario)[name]["start_m"][:2])
         off = {unit: float(np.linalg.norm(stream.places[0, :2] / PER_M[unit] - start)) for unit in ("m", length)}
@@ -119,13 +119,13 @@ def _since_1970(stream: Stream, duration_s: float) -> str:
 
 
 def _is_seldom(streams: Mapping[str, Stream], lasting: float) -> bool:
-    """Whether a log in seconds would be much longer than the scenario, with its samples seconds apart."""
+    """Whether a log in seconds would be much longer than the scenario, with samples seconds apart."""
     steps = [np.diff(stream.elapsed_s("s")) for stream in streams.values() if not stream.time_unit]
     return lasting > LONG and min(float(np.median(step)) for step in steps) >= SELDOM_S
 
 
 def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str, list[str]]:
-    """The units of time and length that are still open, and why they are not seconds and metres."""
+    """The unknown units of time and length, and the reasons for others than seconds and metres."""
     # Metres stand unless they are impossible: then robots would be too fast, whatever the unit of time, or far from the
     # scenario, and in another unit they start where the scenario has them, or move among what is in it.
     times = [""] if all(stream.time_unit for stream in streams.values()) else [*PER_S]
@@ -196,7 +196,7 @@ def _time(
 
 
 def _fitting(streams: Mapping[str, Stream], scenario: Json, lengths: list[str]) -> list[str]:
-    """The units in which all robots begin where the scenario has them; none if it has them all near (0, 0)."""
+    """The units in which all robots begin at the scenario's starts; none if these are all near (0, 0)."""
     starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2]) for name in streams}
     if max(float(np.linalg.norm(start)) for start in starts.values()) < 5.0 * NEAR_M:
         return []
@@ -208,7 +208,7 @@ def _fitting(streams: Mapping[str, Stream], scenario: Json, lengths: list[str]) 
 
 
 def _motion(streams: Mapping[str, Stream], scenario: Json, time: str, length: str) -> _Motion:
-    """The motion of robots, if what they leave open is in these units."""
+    """The robots' motion, with unknown units set to these."""
     robots = robots_of(scenario)
     starts = {name: np.array(robots[name]["start_m"][:2], dtype=np.float64) for name in streams}
     goals = [np.array(ugv["target_m"][:2], dtype=np.float64) for ugv in scenario["ugvs"].values()]

@@ -1,4 +1,4 @@
-"""What is said of a judged log, as lines: the verdict first, then what it rests on."""
+"""The output lines about a judged log: the verdict first, then its basis."""
 
 from collections.abc import Iterator, Sequence
 

@@ -1,4 +1,4 @@
-"""Claims as assertions: a failure says in words what was claimed, what was found, and what was needed."""
+"""Claims as assertions: a failure states the claim, the result, and the requirement."""
 
 import warnings
 from collections.abc import Iterable, Sequence
@@ -106,7 +106,7 @@ def _require(verdicts: Iterable[Verdict], place: str, *, exercised: bool) -> Non
 
 
 def told(verdict: Verdict, place: str) -> str:
-    """A verdict in several lines: what was claimed, what was found, by whom and when, and what was seen there."""
+    """A verdict in several lines: claim, result, bodies, time, and evidence."""
     of = verdict.claim
     claim = Claim.model_construct(exercised_by=of.exercised_by, **strict(Finding.to_json(verdict)))
     lines = [f"{of.id} {_found(verdict)}, {place}", f"  claim: {of.statement}", f"  found: {in_words(claim)}"]

@@ -153,7 +153,7 @@ def scenarios(
 
 
 def _farthest(safe: schema.SafeDistance, own: float) -> float:
-    """The largest distance that any two bodies keep, m, if an obstacle may have its own."""
+    """The largest distance that any two bodies keep, m, including obstacles' own distances."""
     return max(safe.obstacle_m, safe.moving_m, safe.ugv_m, safe.air_ground_m, own)
 
 
@@ -237,7 +237,7 @@ def _move(draw: DrawFn, obstacle: schema.Obstacle, cells: list[Cell], pitch: flo
 
 @st.composite
 def _places(draw: DrawFn, free: list[Cell], pitch: float, besides: Cell | None = None) -> schema.Vector:
-    """A point on the ground, m, in a free cell other than `besides`; the cell is free no more."""
+    """A point on the ground, m, in a free cell other than `besides`, which is then occupied."""
     options = [cell for cell in free if cell != besides]
     cell = options[draw(st.integers(0, len(options) - 1))]
     free.remove(cell)

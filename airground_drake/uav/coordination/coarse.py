@@ -1,4 +1,4 @@
-"""A coarse roadmap for joint plans: few nodes, one robot's width or so apart, and the ways of the roadmap between them.
+"""A coarse roadmap for joint plans: few nodes, about one robot's width apart, joined by paths of the fine roadmap.
 
 The nodes are drawn from the roadmap so that no two are nearer to each other than a given width, if nothing is in
 between. Every node of the roadmap belongs to the nearest of them by way. Two nodes whose regions touch are joined by
@@ -56,7 +56,7 @@ class Coarse(NamedTuple):
 
 
 class _Edge(NamedTuple):
-    """An edge before it has a number; `size` is the largest size of robot, as an index, that can use it."""
+    """An edge without a number; `size` is the index of the largest robot size that can use it."""
 
     tail: int
     head: int
@@ -65,7 +65,7 @@ class _Edge(NamedTuple):
 
 
 def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
-    """The coarse roadmap of some robots with nodes at least `width`, m, apart by way; targets may be nearer."""
+    """The coarse roadmap of robots with nodes at least `width`, m, apart in path length; targets may be nearer."""
     # Starts have edges that lead away only. As ordinary nodes they would make corridors look wider than they are.
     # width: m.
     spaces = sorted({mover.space.apart: mover.space for mover in movers}.values(), key=lambda space: -space.apart)
@@ -92,7 +92,7 @@ def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
 
 
 def _ways(movers: Sequence[Mover], sizes: Indices, size: int, space: Space) -> csr_array:
-    """The roadmap for robots of one size: free nodes, and edges from their starts, which may be too near to things."""
+    """The roadmap for robots of one size: free nodes, and edges from their starts, which need not be free."""
     roadmap = min(movers, key=lambda mover: mover.space.apart).roadmap
     nodes, heads, lengths = roadmap.nodes, roadmap.heads, roadmap.lengths
     tails = np.repeat(np.arange(len(nodes)), np.diff(roadmap.first_edge))
@@ -106,7 +106,7 @@ def _ways(movers: Sequence[Mover], sizes: Indices, size: int, space: Space) -> c
 
 
 def _nodes(graphs: Sequence[csr_array], places: Array, targets: Indices, sizes: Indices, width: float) -> Indices:
-    """Nodes of the roadmap for the coarse one: the targets, then every node that is `width`, m, from all before it."""
+    """Nodes of the coarse roadmap: the targets, then every node at least `width`, m, from all previous ones."""
     chosen = np.zeros(0, dtype=np.int64)
     for size, ways in enumerate(graphs):
         wanted = np.unique(targets[sizes == size])
@@ -126,7 +126,7 @@ def _packed(
     wanted: npt.NDArray[np.bool_],
     width: float,
 ) -> Indices:
-    """The nodes `always`, and of the `wanted` nodes, in order, those that are `width`, m, from all chosen before."""
+    """The nodes `always`, then the `wanted` nodes, in order, that are at least `width`, m, from all chosen ones."""
     # Nodes behind a wall do not count: only those to which a way leads that is hardly longer than the lattice makes it.
     count = len(first) - 1
     covered, way_to = np.zeros(count, np.bool_), np.full(count, np.inf)

@@ -1,8 +1,8 @@
 """A first plan for robots that block each other: LaCAM on several coarse roadmaps, with growing effort.
 
 Wide nodes make few configurations, in which the swap rule sees the corridors. Narrow nodes let robots pass where wide
-ones do not. So every width is tried with a small effort before any of them gets a large one. On the roadmap that has a
-plan, some more plans are made with shuffled moves; the one with the least sum of times is taken.
+ones do not. So every width is tried with a small effort before any gets a large one. When a roadmap yields a plan, some
+more plans are made on it with shuffled moves, and the one with the least sum of times is taken.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class FirstPlan:
 
 
 def first_plan(movers: Sequence[Mover], fixed: Sequence[OtherRobot], candidates: int) -> FirstPlan:
-    """Ways of all robots to their targets, where they wait for the end of their presets."""
+    """Paths of all robots to their targets, where they wait for the end of their presets."""
     least = min(mover.space.apart for mover in movers)
     searches = [_Search(movers, fixed, share, share * least) for share in WIDTHS]
     spent, budget, turn = 0, FIRST * len(movers), 0
@@ -80,7 +80,7 @@ def first_plan(movers: Sequence[Mover], fixed: Sequence[OtherRobot], candidates:
 def _best(
     found_on: _Search, first: lacam.Steps, others: Sequence[_Search], candidates: int
 ) -> tuple[tuple[Way, ...], int]:
-    """The best of some plans with shuffled moves, on several roadmaps, and what they cost."""
+    """The best of some plans with shuffled moves, on several roadmaps, and the effort spent."""
     best, spent = found_on.timed(first.moves), 0
     again = list(dict.fromkeys([found_on, *others]))
     for turn in range(AGAIN // len(again)):
@@ -117,7 +117,7 @@ class _Search:
         return self._made
 
     def run(self, candidates: int, turn: int) -> lacam.Steps:
-        """Search within this effort; another turn shuffles the moves in another way."""
+        """Search within this effort; `turn` selects the shuffling of moves."""
         coarse, team, _ = self._make()
         shuffled = team._replace(noise=NOISES[turn % len(NOISES)] * self._width)
         result = lacam.search(coarse.graph, shuffled, coarse.starts, candidates, turn)
@@ -168,7 +168,7 @@ def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], 
 
 @njit(cache=True)
 def _shut_by(graph: CoarseGraph, motion: Array, apart: float, step: float, shut: npt.NDArray[np.bool_]) -> None:
-    """Mark the edges that a robot cannot travel in each step, as it would come too near to a known motion."""
+    """Mark the edges that bring a robot too near to a known motion in each step."""
     # motion: (M, 3); step: s
     # shut: the result, (L, E).
     circles, rows, begins = graph.circles, graph.rows, graph.begins

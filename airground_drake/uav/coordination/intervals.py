@@ -199,7 +199,7 @@ def reach_neighbours(
     before: Indices,
     heap: list[tuple[float, int]],
 ) -> None:
-    """Note earlier arrivals at the neighbours of a node, and put their intervals on the heap."""
+    """Record earlier arrivals at the neighbours of a node, and push their intervals onto the heap."""
     # i: safe interval of the node in which the robot may wait.
     # arrival: earliest arrival found in each interval, (K,), s; written to.
     # before: interval from which each is reached, (K,); written to.

@@ -69,7 +69,7 @@ def plan(
     follow: float = math.inf,
     effort: Effort | None = None,
 ) -> Plan:
-    """Plan ways for some robots, which keep their distances from discs, from each other and from fixed motions."""
+    """Plan paths for robots that keep their distances from obstacles, each other and fixed motions."""
     # 1. The robots are planned for in turn, the longest way first, each among the ways of those before it. If a robot
     #    finds no way, every robot keeps clear of the starts of later robots until these can have left.
     # 2. If that fails, robots without a way even alone are left where they are, and the others are planned for again.
@@ -104,7 +104,7 @@ def plan(
 
 
 def _separated(spaces: Sequence[Space], tasks: Sequence[RobotTask], ways: Sequence[Way | None]) -> tuple[int, ...]:
-    """Robots that no way can lead to their targets, whatever the roadmap. Clearances do not count here."""
+    """Robots that are separated from their targets on any roadmap, ignoring clearances."""
     apart = []
     for i, (space, task, way) in enumerate(zip(spaces, tasks, ways, strict=True)):
         if way is None:
@@ -131,7 +131,7 @@ class _Search:
         self._without_way = [i for i, mover in enumerate(movers) if math.isinf(mover.to_go[mover.own.start])]
 
     def complete(self) -> list[Way | None] | None:
-        """A plan for all robots that have a way alone, or None."""
+        """A plan for all robots that have a path alone, or None."""
         ways, failed = self._in_either_way(self._by_length(self._without_way))
         if failed is not None:
             before = len(self._without_way)
@@ -149,7 +149,7 @@ class _Search:
         return complete
 
     def _improved(self, ways: list[Way | None] | None, able: Sequence[int]) -> list[Way | None] | None:
-        """A better plan than that of an order, or one by joint steps if no order has one; None without either."""
+        """The prioritised plan improved, or a plan by joint steps if there is none; None without either."""
         candidates = self._effort.candidates
         if ways is not None:
             alone = self._refine(ways, able)
@@ -165,7 +165,7 @@ class _Search:
         return others if ways is None else min(ways, others, key=sum_of_times)
 
     def _alone(self) -> list[Way | None]:
-        """The ways that the robots would have without each other; notes robots without a way."""
+        """The robots' paths without each other; records robots without a path."""
         ways: list[Way | None] = []
         taken = self._taken()
         for i, mover in enumerate(self._movers):
@@ -184,18 +184,18 @@ class _Search:
         return max(0, self._limit - self.spent)
 
     def _taken(self) -> list[OtherRobot]:
-        """The robots that are not asked, and those without a way."""
+        """The fixed motions: of other robots, and of robots without a path."""
         return [*self._fixed, *(_resting(self._movers[i].task) for i in self._without_way)]
 
     def _in_either_way(self, order: Sequence[int]) -> tuple[list[Way | None], int | None]:
-        """Plan in one order, plainly and then considerately: ways, and the first robot without a way, or None."""
+        """Plan in one order, first ignoring and then considering later robots; also the first robot without a path."""
         ways, failed = self._in_order(order, self._without_way)
         if failed is not None and failed != order[0]:
             ways, failed = self._in_order(order, self._without_way, considerate=True)
         return ways, failed
 
     def _in_other_orders(self, failed: int) -> tuple[list[Way | None], int | None]:
-        """Plan in more orders, as `_in_either_way`: each time, the robot without a way comes first in the next one."""
+        """Plan in more orders like `_in_either_way`: a robot without a path comes first in the next one."""
         ways: list[Way | None] = [None] * len(self._movers)
         first = failed
         order, tried = self._by_length(self._without_way), set()
@@ -219,7 +219,7 @@ class _Search:
     def _in_order(
         self, order: Sequence[int], staying: Sequence[int], *, considerate: bool = False
     ) -> tuple[list[Way | None], int | None]:
-        """Ways of the robots in this order, and the first robot without a way, or None."""
+        """Paths of the robots in this order, and the first robot without one, or None."""
         ways: list[Way | None] = [None] * len(self._movers)
         taken = [*self._fixed, *(_resting(self._movers[i].task) for i in staying)]
         for k, i in enumerate(order):
@@ -268,7 +268,7 @@ class _Search:
         return list(free)
 
     def partly(self) -> list[Way | None]:
-        """A plan in which robots without a way stay. Each time a robot finds none, the others are planned anew."""
+        """A plan in which robots without a path stay; whenever one has no path, the others are planned again."""
         self._limit = max(self.spent, self._most * 3 // 4) + self._most // 4
         staying = list(self._without_way)
         for _ in self._movers:

@@ -64,7 +64,7 @@ def _looked_up(table: Indices, nodes: Indices, layers: Indices, wanted: Indices,
 
 @njit(cache=True)
 def _next_constraint(digits: Indices, choices: Indices) -> bool:
-    """Count on: `digits` (n + 1,) has the number of robots whose moves are prescribed, then their moves."""
+    """Increment `digits` (n + 1,): the number of robots with prescribed moves, then their moves."""
     # Returns False when all moves of all robots have been prescribed.
     depth = digits[0]
     for k in range(depth, 0, -1):
@@ -92,7 +92,7 @@ def _have_arrived(team: Team, nodes: Indices, layer: int) -> bool:
 
 @njit(cache=True)
 def _successor(graph: CoarseGraph, team: Team, step: Step, order: Indices, digits: Indices, turn: int) -> bool:
-    """Put a joint step together in which the first robots of the order have prescribed moves."""
+    """Make a joint step with prescribed moves of the first robots in the order."""
     first, moves, counts = graph.first, step.moves, step.counts
     layer = counts[3]
     moves[:] = -1

@@ -65,11 +65,11 @@ class Refinement:
             yield random.permutation(len(self.ways)).tolist()
 
     def _late(self, i: int) -> float:
-        """How much later a robot is back than it would be without the others, s."""
+        """Delay of a robot's return caused by the others, s."""
         return self.ways[i].joined - self._alone[i].joined
 
     def _in_the_way(self, late: int) -> list[int]:
-        """The robots in the way that a late robot would have without them, the nearest to it first."""
+        """The robots that block a late robot's own path, the nearest to it first."""
         mover, near = self._movers[late], []
         for j, other in enumerate(self.ways):
             if j != late:
@@ -78,7 +78,7 @@ class Refinement:
         return [j for far, j in sorted(near) if far < 0.0][:MOST_IN_THE_WAY]
 
     def _try(self, group: Sequence[int], expansions: int) -> None:
-        """Plan for some robots anew, in this order, among all others; keep the ways if they are better."""
+        """Plan some robots again, in this order, among all others; keep better paths."""
         changed = list(self.ways)
         taken = [*self._fixed, *(self._body(j, self.ways[j]) for j in range(len(changed)) if j not in group)]
         gain = sum(self._late(i) for i in group)  # largest possible one
@@ -102,7 +102,7 @@ class Refinement:
 def smooth(
     spaces: Sequence[Space], ways: Sequence[Way | None], rests: Sequence[OtherRobot], fixed: Sequence[OtherRobot]
 ) -> list[Way | None]:
-    """The ways with straight pieces where these are free."""
+    """The paths with straight pieces where these are free."""
     # The times at which robots join their presets do not change.
     # ways: one per robot; None: the robot stays where it is.
     smoothed = list(ways)

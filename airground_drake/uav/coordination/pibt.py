@@ -119,7 +119,7 @@ def conflicts(graph: CoarseGraph, one: int, other: int, apart: float, both_arriv
 
 @njit(cache=True)
 def fits(graph: CoarseGraph, team: Team, step: Step, i: int, edge: int) -> bool:
-    """Whether a move of robot i conflicts with no move that another robot has got."""
+    """Whether a move of robot i is compatible with all assigned moves."""
     moves, targets, heads, apart, circles = step.moves, team.targets, graph.heads, team.apart, graph.circles
     x, y, radius = circles[edge, 0], circles[edge, 1], circles[edge, 2]
     arrives = heads[edge] == targets[i]
@@ -137,7 +137,7 @@ def fits(graph: CoarseGraph, team: Team, step: Step, i: int, edge: int) -> bool:
 
 @njit(cache=True)
 def give(graph: CoarseGraph, team: Team, step: Step, root: int) -> bool:
-    """Give a robot a move, and moves to all robots in the way of it; False, and nothing is changed, if that fails."""
+    """Assign a move to a robot and to all robots in its way; False, without changes, if that fails."""
     # The robots that are being given moves are a stack of frames: robot, number of its moves, index of the move tried,
     # robot to change places with, number of robots with moves before it, and next robot to look at.
     at, moves, counts, frames, lists = step.at, step.moves, step.counts, step.frames, step.lists
@@ -176,7 +176,7 @@ def give(graph: CoarseGraph, team: Team, step: Step, root: int) -> bool:
 
 @njit(cache=True)
 def next_move(graph: CoarseGraph, team: Team, step: Step, depth: int) -> bool:
-    """Take back what the robot of a frame has set off, and give it its next best move, if there is one."""
+    """Undo the assignments of a frame's robot, and assign its next best move, if any."""
     moves, given, counts, frames, lists = step.moves, step.given, step.counts, step.frames, step.lists
     i = frames[depth, 0]
     while counts[2] > frames[depth, 4]:
@@ -197,7 +197,7 @@ def next_move(graph: CoarseGraph, team: Team, step: Step, depth: int) -> bool:
 
 @njit(cache=True)
 def next_in_the_way(graph: CoarseGraph, team: Team, step: Step, depth: int) -> int:
-    """The next robot without a move that could not stay beside the move of a frame's robot; -1: none."""
+    """The next robot without a move that cannot stay beside the move of a frame's robot; -1: none."""
     moves, at, frames, apart, circles, places = (
         step.moves, step.at, step.frames, team.apart, graph.circles, graph.places
     )  # fmt: skip
@@ -223,7 +223,7 @@ def must_go(graph: CoarseGraph, team: Team, step: Step, i: int, j: int) -> bool:
 
 @njit(cache=True)
 def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, moves: Indices) -> int:
-    """Sort the moves of robot i so that those come first that its partner can follow, and that lead farthest away."""
+    """Sort the moves of robot i: first those that its partner can follow, and that lead farthest away."""
     # Moves that lead nearer to the target come last. If the partner already pushes robot i, they are left out: the
     # partner has to wait.
     first, heads, at, apart, to_go = graph.first, graph.heads, step.at, team.apart, team.to_go[-1]
@@ -247,7 +247,7 @@ def turn_back(graph: CoarseGraph, team: Team, step: Step, i: int, partner: int, 
 
 @njit(cache=True)
 def follow(graph: CoarseGraph, team: Team, step: Step, j: int, there: int) -> None:
-    """Let robot j go to the node `there` if it can without pushing anybody."""
+    """Let robot j go to the node `there` if that pushes no other robot."""
     at, moves, given, counts = step.at, step.moves, step.given, step.counts
     first, heads, layer = graph.first, graph.heads, step.counts[3]
     for edge in range(first[at[j]], first[at[j] + 1]):
@@ -269,7 +269,7 @@ def follow(graph: CoarseGraph, team: Team, step: Step, j: int, there: int) -> No
 
 @njit(cache=True)
 def sort_moves(graph: CoarseGraph, team: Team, step: Step, i: int, moves: Indices) -> int:
-    """Write the possible moves of robot i into `found`, those first that lead nearest to its target; their number."""
+    """Write the possible moves of robot i into `found`, the nearest to its target first; returns their number."""
     first, heads, to_go = graph.first, graph.heads, team.to_go
     here, layer, number = step.at[i], step.counts[3], step.counts[4]
     later = min(layer + 1, len(to_go) - 1)

@@ -49,7 +49,7 @@ class Space:
         return Space(rows, keep, self.clearance, self.apart + body, self.spacing)
 
     def wide(self, longest: float, body: float = 0.0) -> float:
-        """How far another robot must be from both ends of an edge to be `apart + spacing` from the whole edge, m."""
+        """Distance from both ends of an edge that keeps `apart + spacing` from the whole edge, m."""
         # Let s be the share of the edge up to a point, and L its length. The squared distance to that point is the
         # weighted mean of the squared distances to the ends, less s (1 - s) L^2.
         return math.sqrt((self.apart + body + self.spacing) ** 2 + longest**2 / 4.0)
@@ -117,7 +117,7 @@ class Roadmap:
 
 @dataclass(frozen=True, eq=False)
 class RobotTask:
-    """Where a robot is, and where it must go."""
+    """A robot's start and target."""
 
     start: Array  # its place, (2,), m
     preset: Array  # the rest of its preset, a timed motion (M, 3) from t = 0 on, which ends at its target

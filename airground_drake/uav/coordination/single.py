@@ -35,7 +35,7 @@ class Way:
 
 
 def sum_of_times(ways: Sequence[Way | None]) -> float:
-    """Sum of the times at which robots are back on their presets, s: what plans are compared by."""
+    """Sum of the times at which robots are back on their presets, s: the objective of plans."""
     return math.fsum(way.joined for way in ways if way is not None)
 
 

@@ -31,7 +31,7 @@ def _as_json(value: Any) -> dict[str, Any]:
 
 
 def decoded(data: bytes, kinds: tuple[type, ...]) -> Any:
-    """The message that was encoded. Its arrays are read-only."""
+    """The decoded message, with read-only arrays."""
     # kinds: classes whose objects may be made. The data cannot name any other code.
     named = {kind.__name__: kind for kind in kinds}
 

@@ -62,7 +62,7 @@ class GuestPolicy(Policy):
             raise PluginError(f"policy {name!r}: {fault}") from None
 
     def propose(self, seen: Observation) -> dict[str, Motion] | None:
-        """What the policy proposes; `motions_of` checks the names and numbers afterwards."""
+        """The policy's proposal; `motions_of` checks names and numbers afterwards."""
         if not self._end.alive and self._used >= LIVES:
             return None
         try:
@@ -148,7 +148,7 @@ def end_all() -> None:
 
 @contextmanager
 def _hung_up_after(seconds: float, channel: Connection) -> Iterator[threading.Event]:
-    """Shut a channel after so many seconds, so that the body stops waiting for it, even for half a message."""
+    """Shut down a channel after some seconds, so that the body stops waiting, even within a message."""
     late = threading.Event()
 
     def hang_up() -> None:
@@ -177,5 +177,5 @@ def _kill(process: subprocess.Popen[bytes], channel: Connection, alive: Connecti
 
 
 def _words(fault: object) -> str:
-    """A fault in the policy's words, as one printable line."""
+    """The policy's error message, as one printable line."""
     return one_line(fault[:FAULT_WIDTH]) if isinstance(fault, str) else "its process does not say what went wrong"

@@ -18,7 +18,7 @@ class OutOfTime(BaseException):
 
 @contextmanager
 def time_limit(seconds: float, error: type[BaseException] = OutOfTime) -> Iterator[None]:
-    """Raise an error in the body after so many seconds of wall-clock time; time in which numba compiles is free."""
+    """Raise an error in the body after some wall-clock seconds, not counting compilation by numba."""
     # The limit works in the main thread only. Compiled code is interrupted when it returns to the interpreter. Limits
     # can be nested: an inner limit lasts no longer than the rest of the outer one, which then raises its own error.
     if threading.current_thread() is not threading.main_thread():

@@ -1,4 +1,4 @@
-"""What every route does before and after its own work."""
+"""Checks that every route does before and after its own search."""
 
 from collections.abc import Callable
 
@@ -31,6 +31,6 @@ def without_optimum(
     normals: Array | None = None,
     ended: Status = "solver_failed",
 ) -> Solution:
-    """The better constant plan, when a solver gave no solution; whatever it says, a spent budget is the reason."""
+    """The better constant plan, if a solver gave no solution; a spent budget takes precedence as the reason."""
     status: Status = "budget_spent" if budget.spent() else ended
     return cut_short(problem, constants.both, unavoidable_cost(problem), status, normals=normals)

@@ -1,4 +1,4 @@
-"""The paper's route by the letter: (27) by multiple shooting, solved as a nonlinear program, then (28)-(29)."""
+"""The paper's route literally: (27) by multiple shooting, solved as a nonlinear program, then (28)-(29)."""
 
 import math
 from typing import Any

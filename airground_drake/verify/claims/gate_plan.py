@@ -1,4 +1,4 @@
-"""GATE-PLAN: every plan of a run is feasible at the cost that was recorded, and how far it is from the optimum.
+"""GATE-PLAN: every plan of a run is feasible and has its recorded cost; also its gap to the optimum.
 
 A decision's problem is convex once its plan is relaxed and its distances are measured along recorded unit normals,
 and convexity gives bounds that need no trust in any solver: see `enclose`.
@@ -53,13 +53,13 @@ NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (
 class GatePlan(GateClaim):
     id = "GATE-PLAN"
     subject = "plans of the gatekeeper"
-    summary = "Every decision rests on a plan that is feasible and costs what was recorded."
+    summary = "Every decision is based on a feasible plan whose cost was recorded correctly."
     statement = (
         "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
-        "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of "
-        "at most half a stage. Under method (d) a decision accepts or refuses for good: it never chose to stop short "
-        "of the goal if the other choice would reach it, or stop nearer to it. The margin decides nothing: it is the "
-        "largest known gap between the cost of a plan and the optimum of the half-plane problem."
+        "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of at"
+        " most half a stage. Under method (d) no decision chose to stop short of the goal if the other choice would "
+        "have reached it, or stopped nearer to it. The margin is informative only: it is the largest known gap between"
+        " the cost of a plan and the optimum of the half-plane problem."
     )
     latex = (
         r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "
@@ -76,33 +76,32 @@ class GatePlan(GateClaim):
     method = (
         "All numbers are computed again in numpy from the recorded problem. No step of a constant plan is longer than "
         "the speed limit allows, unless it begins more than 1e-6 m inside a safe distance, where avoidance may demand "
-        "more. A stage of another plan is held to that only if the constant plan of its mode keeps clear there. "
-        "Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; after a deficit "
-        "within 1e-9 of 1/2 either mode may follow. For the gap, the half-plane problems of all decisions are stacked "
-        "into one convex program and solved by cvxpy and Clarabel. The solver is not trusted: its multipliers give the "
-        "lower bound L by weak duality, evaluated in numpy, whatever their quality; with up to 12 blocks of stages all "
-        "plans are evaluated instead. The gap is unknown if a plan has no half-planes (the route 'nonlinear' records "
-        "none) or if the bounds of an optimum are more than 1e-5 apart. Problems of at most 10 choices are also solved "
-        "by evaluating all plans with the exact distances of (26d)."
+        "more. For other plans, this limit applies to a stage only if the constant plan of its mode keeps clear there."
+        " Rounding is judged stage by stage, by running sums of the recorded relaxed and rounded plans; after a "
+        "deficit within 1e-9 of 1/2 either mode may follow. For the gap, the half-plane problems of all decisions are "
+        "stacked into one convex program and solved by cvxpy and Clarabel. The solver need not be trusted: any "
+        "multipliers give a valid lower bound L by weak duality, which is evaluated in numpy. With up to 12 blocks of "
+        "stages all plans are evaluated instead. The gap is unknown if a plan has no half-planes (the route "
+        "'nonlinear' records none) or if the bounds of an optimum are more than 1e-5 apart. Problems of at most 10 "
+        "choices are also solved by evaluating all plans with the exact distances of (26d)."
     )
     equations = "(22)-(29)"
     assumptions = (
         "The problem of each decision is the recorded one: mode velocities, reference, other bodies, weights and unit "
-        "normals. A half-plane is part of it only where some plan can come nearer than d: elsewhere (26d) asks for "
-        "nothing.",
-        "The cost of the choice that lost is the recorded one.",
+        "normals. It contains a half-plane only where some plan can come closer than d; elsewhere (26d) has no effect.",
+        "The cost of the rejected choice is the recorded one.",
         "The recorded relaxed plan was rounded, and no other.",
         "Under method (d), the recorded outcomes of both choices.",
     )
     does_not_establish = (
         "That the prediction is right, or that the run went as predicted. (26d) is soft: a feasible plan may lead "
-        "inside a safe distance, at the cost of its slack (SAFE-TRACE is about safety). A wide gap refutes nothing: "
-        "half-planes are conservative, and the best plan by exact distances may cost less than their optimum. The "
-        "gatekeeper takes the cheapest plan it knows, which need not be the rounded one. Refusals without a plan "
-        "are only listed."
+        "inside a safe distance, at the cost of its slack (SAFE-TRACE is about safety). A large gap does not refute "
+        "the claim: half-planes are conservative, and the best plan by exact distances may cost less than their "
+        "optimum. The gatekeeper takes the cheapest plan that it knows, which need not be the rounded one. Refusals "
+        "without a plan are only listed."
     )
 
-    exercised_by = "decisions that rest on a plan or on predicted outcomes"
+    exercised_by = "decisions based on a plan or on predicted outcomes"
 
     def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Judge every plan; the margin is the largest gap."""
@@ -153,7 +152,7 @@ class GatePlan(GateClaim):
 
 
 def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
-    """(26b)-(26e), (25) and what was recorded about the plan."""
+    """Compare (26b)-(26e), (25) and the recorded numbers of the plan."""
     limit = trace.scenario.ugvs[row.robot].max_speed_m_s
     period = trace.scenario.control.period_s
     begins = row["initial_m"] - _seen_at(trace, row)
@@ -196,7 +195,7 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
 
 
 def _seen_at(trace: Trace, row: DecisionRecord) -> Array:
-    """Where a UGV saw itself when it decided, (3,), m."""
+    """A UGV's measured position when it decided, (3,), m."""
     if trace.scenario.sensing is None:
         return interpolate(trace.t, trace.position(row.robot), row.t_s)
     sample = int(np.searchsorted(trace.sampled("t_s"), row.t_s - TIME_TOLERANCE_S))
@@ -242,7 +241,7 @@ def _of_decisions(
 
 
 def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
-    """A choice that stops short of the goal, beside the other one; and what such a stop costs."""
+    """Compare a choice that stops short of the goal with the other one."""
     given, speed = row.given, trace.scenario.ugvs[row.robot].preset.speed_m_s
     chosen, other = ("accept", "refuse") if given["decision"] == "accept" else ("refuse", "accept")
     worse = given[f"{chosen}_stalls"] - given[f"{other}_stalls"]
@@ -258,7 +257,7 @@ def _compare_choice(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
 
 
 def _above_the_other(row: DecisionRecord) -> float:
-    """How much the choice costs more than the better one, relative to that; 0 if only the other one stops short."""
+    """Relative excess cost of the choice over the better one; 0 if only the other one stops short."""
     cost = {choice: row.given[f"{choice}_outcome_m2_s"] for choice in ("accept", "refuse")}
     if row.given["accept_stalls"] != row.given["refuse_stalls"]:
         return 0.0
@@ -304,7 +303,7 @@ def cheapest_of_blocks(row: DecisionRecord, blocks: int) -> Enclosure:
 
 
 def above_the_best(row: DecisionRecord, blocks: int) -> float:
-    """How much the plan costs more than the best of all plans, by exact distances, relative to the best."""
+    """Relative excess cost of the plan over the best of all plans, by exact distances."""
     best = float(row.cost(row.positions(plans_of_blocks(row.stages, blocks or row.stages))).min())
     return (float(row.cost(row["positions_m"])) - best) / max(best, LEAST_COST)
 

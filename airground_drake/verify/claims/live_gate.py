@@ -10,11 +10,10 @@ from airground_drake.verify.runs.proposals import Acceptance, acceptances
 
 class LiveGate(LiveWait):
     id = "LIVE-GATE"
-    summary = "An accepted intervention is carried through to its end, unless a new obstacle is sensed."
+    summary = "An accepted intervention is completed, unless a new obstacle is sensed."
     statement = (
-        "Under method (d) a UGV gives back an accepted intervention early only if it senses an obstacle that it did "
-        "not know when it accepted. Otherwise the intervention ends with its motion, or after the longest time "
-        "allowed."
+        "Under method (d) a UGV ends an accepted intervention early only if it senses an obstacle that it did not know"
+        " when it accepted. Otherwise the intervention ends with its motion, or after the longest time allowed."
     )
     latex = (
         r"\text{accepted}(t) \text{ for } t_0 \le t < \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}})",
@@ -22,9 +21,10 @@ class LiveGate(LiveWait):
         r"h \text{ the period of the gatekeeper}",
     )
     method = (
-        "Theorems in Coq about the transitions of a commitment. Tests compare those of the running `Patience` with the "
-        "theorem's, and disturb the running gatekeeper and control law. LIVE-HYP checks the hypotheses on every run "
-        "under (d). The report counts the acceptances during which no obstacle was new and none in range may move."
+        "Theorems in Coq about the transitions of a commitment. Tests compare the transitions of the running "
+        "`Patience` with the theorem's, and disturb the running gatekeeper and control law. LIVE-HYP checks the "
+        "hypotheses on every run under (d). The report counts the acceptances without a new obstacle, and without an "
+        "obstacle in range that may move."
     )
     equations = "(20)"
     assumptions = (
@@ -34,8 +34,8 @@ class LiveGate(LiveWait):
         "The gatekeeper is sampled every period. Rounding of times is not counted.",
     )
     does_not_establish = (
-        "That a proposal is accepted, or that the UGV is where it was predicted to be: that depends on the other "
-        "robots. LIVE-WAIT bounds the time."
+        "That a proposal is accepted, or that the UGV moves as predicted, which depends on the other robots. LIVE-WAIT"
+        " bounds the time."
     )
 
     theorems = ("Patience.kept", "Patience.over_in_time")
@@ -44,7 +44,7 @@ class LiveGate(LiveWait):
         return {"over_after_s": float(inputs["longest_s"] + inputs["period_s"])}
 
     def seen_in(self, trace: Trace) -> tuple[int, int]:
-        """The acceptances during which no obstacle was new and none in range may move, and all."""
+        """The number of acceptances without a new obstacle or one in range that may move, and of all."""
         accepted = [acceptance for of_ugv in acceptances(trace).values() for acceptance in of_ugv]
         met = [acceptance for acceptance in accepted if not (acceptance.news_s or _beside_a_mover(trace, acceptance))]
         return len(met), len(accepted)

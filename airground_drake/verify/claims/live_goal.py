@@ -23,10 +23,10 @@ AT_REST_M = 1e-3
 class LiveGoal(TraceClaim):
     id = "LIVE-GOAL"
     subject = "arrival"
-    summary = "Every robot ended where it must: at its target, or where the scenario says that it stalls."
+    summary = "Every robot ended at its target, or at the point where the scenario expects it to stall."
     statement = (
-        "Every robot ended the run at its target, or standing where the scenario declares that it stalls. For a robot "
-        "that collided, its motion before the first collision counts."
+        "Every robot ended the run at its target, or standing at the point where the scenario expects it to stall. For"
+        " a robot that collided, only its motion before the first collision counts."
     )
     latex = (
         r"\lVert p_i(T) - \text{target}_i \rVert \le \varepsilon_{\text{arrival}}",
@@ -41,11 +41,11 @@ class LiveGoal(TraceClaim):
     equations = "(6), (9)-(10)"
     assumptions = ("The scenario's duration is long enough to judge: the run is not continued.",)
     does_not_establish = (
-        "Arrival from other starts, without bound on time, or that a stalled UGV would stay for ever; nor that robots "
-        "tracked their preset on the way. Without potential or navigation function no convergence proof exists."
+        "Arrival from other starts or in unlimited time, that a stalled UGV would stay for ever, or that robots "
+        "tracked their preset. Without a potential or navigation function there is no convergence proof."
     )
 
-    exercised_by = "robots that had a way to go to where they must end"
+    exercised_by = "robots that did not start where they must end"
 
     def check(self, trace: Trace) -> Finding:
         stalls = trace.scenario.runs[trace.run].stalls_m
@@ -76,14 +76,14 @@ class LiveGoal(TraceClaim):
 
 
 class Condition(NamedTuple):
-    """A condition on a robot's end, as evidence, and whether the robot did not begin where it has to end."""
+    """A condition on a robot's end, as evidence, and whether the robot began elsewhere."""
 
     entry: dict[str, Any]
     had_a_way: bool = False
 
 
 class Way(NamedTuple):
-    """Where a robot was, up to its first collision."""
+    """A robot's motion up to its first collision."""
 
     t: Array  # (T,), s
     position: Array  # (T, 3), m
@@ -92,7 +92,7 @@ class Way(NamedTuple):
 def conditions(
     scenario: Scenario, stalls: Mapping[str, Sequence[float]], ways: Mapping[str, Way], last: Array
 ) -> Iterator[Condition]:
-    """What the scenario declares of each robot's end, with the margins, m; `stalls` has the stall points of UGVs, m."""
+    """The scenario's conditions on each robot's end, with margins, m; `stalls` has the stall points of UGVs, m."""
     # last: where the n UGVs are at the end of the run, (n, 3), m
     arrival = float(scenario.arrival_tolerance_m)
     for ugv, given in scenario.ugvs.items():
@@ -117,7 +117,7 @@ def conditions(
 def _within(
     ways: Mapping[str, Way], robot: str, condition: str, point: Array | Sequence[float], tolerance_m: float
 ) -> Condition:
-    """That a robot ends no farther from a point, (3,), m, than a tolerance."""
+    """The condition that a robot ends within a tolerance of a point, (3,), m."""
     there = np.asarray(point, dtype=np.float64)
     begin, end = ways[robot].position[[0, -1]]
     before, after = (float(np.linalg.norm(place - there)) for place in (begin, end))

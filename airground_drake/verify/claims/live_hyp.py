@@ -14,11 +14,13 @@ from airground_drake.verify.runs.proposals import METHOD, Acceptance, acceptance
 
 class LiveHyp(GateClaim):
     id = "LIVE-HYP"
-    summary = "No UGV followed the UAV more often or longer than it may, or changed its mind without a new obstacle."
+    summary = (
+        "No UGV followed the UAV more often or longer than allowed, or reversed an acceptance without a new obstacle."
+    )
     statement = (
-        "Between two rests, no UGV accepted more proposals than it may, and none executed proposals for longer than "
-        "LIVE-WAIT allows. Every acceptance ended in time. No UGV gave a proposal back early, unless it first sensed "
-        "an obstacle that was not on the proposal's map."
+        "Between two rests, no UGV accepted more proposals than allowed, and none executed proposals for longer than "
+        "LIVE-WAIT allows. Every acceptance ended in time. No UGV ended an accepted proposal early, unless it first "
+        "sensed an obstacle that was not on the proposal's map."
     )
     formula = (
         "between two rests of rest_s on its own: acceptances <= tries, time executed <= tries (longest_s + h); "
@@ -30,13 +32,13 @@ class LiveHyp(GateClaim):
         r"t_{\text{end}} \le \min(t_{\text{motion}}, t_0 + \tau_{\text{longest}}) + h",
     )
     method = (
-        "Intervals of acceptance follow from the decisions of each UGV. What it executed is recorded at each control "
-        "sample. Which obstacles were new to it is recorded with its decisions."
+        "Intervals of acceptance are computed from the decisions of each UGV. The trace records the executed proposal "
+        "at each control sample, and new obstacles with each decision."
     )
     equations = "(20)"
     assumptions = ("A proposal without a decision at a sample of the gatekeeper is no longer in force.",)
     does_not_establish = (
-        "That accepted proposals were useful, or that UGVs arrive (LIVE-GOAL). Why proposals were accepted or refused."
+        "That accepted proposals were useful, that UGVs arrive (LIVE-GOAL), or why proposals were accepted or refused."
     )
 
     exercised_by = "acceptances"
@@ -46,7 +48,7 @@ class LiveHyp(GateClaim):
         return trace.meta.get("method") == METHOD
 
     def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
-        """Go through all acceptances; the margin is what is left of the time that LIVE-WAIT allows."""
+        """Judge all acceptances; the margin is the rest of the time that LIVE-WAIT allows."""
         gate, accepted = trace.scenario.gatekeeper, acceptances(trace)
         allowed_s = gate.tries * (gate.longest_s + gate.period_s)
         most = 0
@@ -88,7 +90,7 @@ class LiveHyp(GateClaim):
 
 
 def _wrong(trace: Trace, of_ugv: list[Acceptance]) -> Iterator[dict[str, Any]]:
-    """Acceptances that were over too late, or given back too early without news."""
+    """Acceptances that ended too late, or too early without a new obstacle."""
     period_s = trace.scenario.gatekeeper.period_s
     for acceptance in of_ugv:
         sent, end_s, until_s = acceptance.on, acceptance.end_s, acceptance.until_s
@@ -101,7 +103,7 @@ def _wrong(trace: Trace, of_ugv: list[Acceptance]) -> Iterator[dict[str, Any]]:
 
 
 def _after_rests(of_ugv: list[Acceptance], rest_s: float) -> list[float]:
-    """When tries begin to count anew, s: at the start of the run, and at each acceptance after a rest."""
+    """Times at which tries are reset, s: the start of the run, and each acceptance after a rest."""
     begins = [acceptance.t_s for acceptance in of_ugv]
     ends = [0.0, *(acceptance.end_s for acceptance in of_ugv)]
     rested = (t_s for t_s, end_s in zip(begins, ends, strict=False) if t_s - end_s >= rest_s - TIME_TOLERANCE_S)
@@ -109,7 +111,7 @@ def _after_rests(of_ugv: list[Acceptance], rest_s: float) -> list[float]:
 
 
 def _executed_s(trace: Trace, ugv: str, begins: list[float]) -> list[float]:
-    """For how long a UGV executed proposals between such instants, s."""
+    """Time for which a UGV executed proposals between resets, s."""
     followed = np.append(trace.sampled(f"{ugv}.executing") >= 0, False).astype(np.int64)
     cuts = np.searchsorted(trace.sampled("t_s"), np.array(begins) - TIME_TOLERANCE_S)
     return [float(count) * trace.scenario.control.period_s for count in np.add.reduceat(followed, cuts)]

@@ -11,11 +11,11 @@ from airground_drake.verify.runs.proposals import below_avoidance
 
 class LiveWait(TheoremClaim):
     id = "LIVE-WAIT"
-    summary = "No UAV keeps a UGV from its own task for longer than a bound at a time; then the UGV rests."
+    summary = "A UAV keeps a UGV from its own task for at most a bounded time; then the UGV rests."
     statement = (
-        "Under method (d) a UAV keeps a UGV from its own task for a bounded time at most. Then the UGV is on its own "
-        "until it has rested. This holds whatever the UAV proposes, withdraws, says of its map or names as its cause, "
-        "and whatever a channel does to its messages."
+        "Under method (d) a UAV keeps a UGV from its own task for at most a bounded time. Then the UGV follows its own"
+        " task until it has rested. This holds for any proposals, withdrawals, maps and causes that the UAV sends, and"
+        " for any delay or loss of messages."
     )
     latex: tuple[str, ...] = (
         r"\text{time executed between two rests} \le N (\tau_{\text{longest}} + h), \quad N \text{ tries}, \; "
@@ -32,8 +32,8 @@ class LiveWait(TheoremClaim):
         "Rounding of times, 1e-15 s, is not counted.",
     )
     does_not_establish = (
-        "How often a UAV does so: after each rest it may again. Nor that an accepted intervention is useful, that the "
-        "UGV gets anywhere on its own, or that refused proposals cost only messages. Safety is SAFE-GATE."
+        "How often a UAV does so: it may do so again after each rest. That an accepted intervention is useful, that "
+        "the UGV makes progress on its own, or that refused proposals cost only messages. SAFE-GATE is about safety."
     )
 
     theorems: tuple[str, ...] = ("Patience.bounded",)

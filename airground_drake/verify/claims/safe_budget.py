@@ -1,4 +1,4 @@
-"""SAFE-BUDGET: bodies that are not where the law steers them keep their distances if the steered points keep theirs."""
+"""SAFE-BUDGET: bodies off their steered points keep their distances if the steered points keep the law's."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -27,17 +27,16 @@ BESIDE_MOVING = ("Passive.own_doing", "Passive.kept")
 class SafeBudget(TheoremClaim):
     id = "SAFE-BUDGET"
     subject = "distance budget"
-    summary = "The law adds what turning, lags, delays and errors of positions cost, so bodies keep the safe distance."
+    summary = "The law allows for turning, lags, delays and position errors, so that bodies keep the safe distance."
     statement = (
-        "Suppose that the points that the law steers keep the law's distance d_law at the samples, and that the "
-        "bodies start at the safe distance d. Then the bodies keep d at all times: those of robots that turn, lag, "
-        "get their commands late or have a plant of the user's own, of robots that act on measured positions with "
-        "bounded errors, and of UGVs that stand where they lack another one's message. With measured positions, each "
-        "pair meets its inequality as measured, or both stand. UGVs that act on old positions of each other, of any "
-        "age, keep d if each keeps off where the other can be until that one decides again. When an obstacle appears, "
-        "a body that lags or gets its commands late must be clear of it, and so must its way under commands already "
-        "given (SAFE-HYP). Beside an obstacle that may move, the bodies keep what SAFE-OWN states. For each kind of "
-        "pair d_law is at least what the theorems ask for."
+        "Let the points that the law steers keep the law's distance d_law at the samples, and let the bodies start at "
+        "the safe distance d. Then the bodies keep d at all times. This covers robots that turn, lag, receive commands"
+        " late or have the user's own plant; robots that act on measured positions with bounded errors; and UGVs that "
+        "stand still if they miss another UGV's message. With measured positions, each pair meets its inequality as "
+        "measured, or both stand. UGVs that act on old positions of each other, of any age, keep d if each avoids all "
+        "points that the other can reach before it decides again. When an obstacle appears, a body with a lag or delay"
+        " must be clear of it, and so must its path under commands already given (SAFE-HYP). SAFE-OWN applies beside "
+        "an obstacle that may move. For each kind of pair d_law is at least the distance that the theorems require."
     )
     latex = (
         r"d_{\mathrm{law}} \ge b + \sum_{i} (c_i + f_i + w_i / A), \quad b = d + V |\delta_i - \delta_j| \text{ or } "
@@ -53,29 +52,29 @@ class SafeBudget(TheoremClaim):
     )
     method = (
         "Theorems in Coq about each kind of plant. Their hypotheses on the numbers of the scenario are checked here; "
-        "what bodies keep at each distance of the law is computed, and may be less than the safe distance by 1e-12 m. "
-        "SAFE-HYP checks what a run has to meet. `airground check` computes the distances of the law again."
+        "the distance that bodies keep is computed from the law's distance, and may be less than the safe distance by "
+        "1e-12 m. SAFE-HYP checks the hypotheses about a run. `airground check` computes the law's distances again."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
-        "The plants of the scenario are those of the robots: no slip, no error of a heading, time constant or delay. "
-        "The user's own plants drift and cover no more than they declare (SAFE-HYP measures both in the run).",
+        "The scenario's plants describe the robots exactly: no slip, no error of heading, time constant or delay. "
+        "Drift and cover of the user's own plants stay within the declared values (SAFE-HYP measures both in the run).",
         "Commands stay within the speed limits (SAFE-HYP checks the run).",
-        "Measured positions are no farther off than declared, and all robots act on the same ones (SAFE-HYP checks "
-        "both in the run).",
-        "UGVs that act on old positions of each other are discs that move as they are told (others are refused), and "
-        "start d apart; positions were exact, and h is the period of both (SAFE-HYP checks each step against them).",
-        "A delay comes before a lag. Between a robot with either and a unicycle, what both cost is added up.",
+        "Errors of measured positions stay within their bound, and all robots act on the same positions (SAFE-HYP "
+        "checks both in the run).",
+        "UGVs that act on old positions of each other are discs that follow commands exactly (others are refused), and"
+        " start d apart; the positions were exact when sent, and both have the period h (SAFE-HYP checks each step).",
+        "A delay comes before a lag. Between a robot with either and a unicycle, both costs are added.",
     )
     does_not_establish = (
-        "That the steered points keep the law's distance (SAFE-INV does), or that a command was met in full: a "
-        "shortened command recovers a distance at a smaller gain."
+        "That the steered points keep the law's distance (SAFE-INV does), or that commands were not shortened: a "
+        "shortened command recovers a distance with a smaller gain."
     )
     theorems: tuple[str, ...] = (*BASIC, *OF_ERRORS, *OF_OLD, *BESIDE_MOVING, "Plants", "Turning", "Mixed")
     margin_of = "distance in the law less what the plants take"
 
     def applies(self, scenario: Scenario) -> bool:
-        """Only a scenario with robots that are not where the law steers or sees them, or that may lack a position."""
+        """Only for robots off their steered or measured points, or that may miss positions."""
         lacking = any(scenario.seen(ugv)["may_stand"] for ugv in scenario.ugvs)
         return takes_room(scenario) or lacking or (scenario.asynchronous and len(scenario.ugvs) > 1)
 
@@ -101,7 +100,7 @@ class SafeBudget(TheoremClaim):
         }  # fmt: skip
 
     def _old(self, scenario: Scenario) -> list[dict[str, Any]]:
-        """Of each kind of two UGVs: what is promised, and how far off the other one can be at least, m."""
+        """For each kind of UGV pairs: promised distance, and least uncertainty of the other position, m."""
         groups = (group[0] for group in alike(budget(scenario)) if group[0].kind == "ugv")
         return [
             {
@@ -111,7 +110,7 @@ class SafeBudget(TheoremClaim):
         ]  # fmt: skip
 
     def check(self, inputs: dict[str, Any]) -> Finding:
-        """Check the hypotheses; the theorems are those about the plants that the scenario has."""
+        """Check the hypotheses of the theorems about the scenario's plants."""
         moving = any(pair["kind"] == "moving" for pair in inputs["pairs"])
         plants = [plant for plant, _ in _plants(inputs).values()]
         named = [*BASIC, *(name for plant in plants for name in plant.theorems)]

@@ -22,21 +22,19 @@ from airground_drake.verify.runs.passive import beside
 
 class SafeDist(TheoremClaim):
     id = "SAFE-DIST"
-    summary = "Bounded velocity errors cost a bounded distance, unless two robots stand for lack of messages."
+    summary = "Bounded velocity errors cost a bounded distance, unless two robots stand because they miss messages."
     statement = (
-        "If velocities are disturbed by at most w and A h <= 1, no distance falls below d - w/A (obstacle) or "
-        "d - 2 w/A (two disturbed robots), as long as its own inequality is met at every sample. After N periods "
-        "inside in a row the distance is at least d - (1 - (1 - A h)^N) W/A if it was d before, W = w or 2 w. "
-        "A robot whose turning or wheel limit leaves the share s of a command meets it with the gain s A: all this "
-        "then holds with s A for A, s the least share of the run. "
-        "Where messages between UGVs may be lost: while one of two UGVs stands for lack of a message, all this holds "
-        "with A/2 for A; a period in which both stand restores nothing, and can cost 2 w h more. "
-        "With several points, each with D >= d - W/A, all inequalities can be met at once if there is a unit vector g "
-        "with n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together. All this is "
-        "about robots and bodies at rest, but not about two UGVs that act on old positions of each other: what these "
-        "lose adds up. Beside an obstacle that may move with V the passive inequality restores "
-        "nothing: w costs w h in each period. With a retreat n.v >= w it costs w h once, and with n.v >= w + V nothing "
-        "is lost."
+        "If velocities are disturbed by at most w and A h <= 1, no distance falls below d - w/A (obstacle) or d - 2 "
+        "w/A (two disturbed robots), as long as its own inequality is met at every sample. After N consecutive periods"
+        " inside d the distance is at least d - (1 - (1 - A h)^N) W/A if it was d before, W = w or 2 w. If turning or "
+        "wheel limits shorten a command by the factor s, the gain is s A: the above holds with s A for A, where s is "
+        "the least factor of the run. If one of two UGVs stands because it misses a message, the above holds with A/2 "
+        "for A. In a period in which both stand, the distance does not recover, and can fall by 2 w h more. With "
+        "several points, each with D >= d - W/A, all inequalities can be met at once if there is a unit vector g with "
+        "n.g >= m > 0 for every point with D < d + h W/m; then all these bounds are kept together. All this is about "
+        "robots and static obstacles, but not about two UGVs that act on old positions of each other, whose losses add"
+        " up. Beside an obstacle that may move at a speed V, the passive inequality does not recover a distance: w "
+        "costs w h in each period. With a retreat n.v >= w it costs w h once, and with n.v >= w + V nothing is lost."
     )
     latex = (
         r"A h \le 1, \; \lVert e \rVert \le w, \; D(0) \ge d - \frac{W}{A} \; \Rightarrow \; D(t) \ge d - "
@@ -50,24 +48,23 @@ class SafeDist(TheoremClaim):
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "The disturbance may change at any time, but is bounded by w in every direction (for a UGV: in its plane).",
-        "An obstacle at rest is a convex set, or several, each counted as one point in what follows. Inside a safe "
-        "distance v = 0 is not feasible, and the inequalities of several points can contradict each other; the layer "
-        "then takes the least violation. So: one violated inequality at a time, or a common direction g as in the "
-        "statement. A UGV straight under the UAV has no such direction; there its disturbance does not count either, "
-        "and the UAV's half suffices (`Gate.overhead`).",
-        "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance (A/8 where a UGV may "
-        "stand for lack of a message), so that at least half of that distance is left. It is a choice, not a property "
-        "of a robot.",
+        "A static obstacle consists of convex sets, each counted as one point in the statement. Inside a safe distance"
+        " v = 0 is not feasible, and the inequalities of several points can contradict each other; the layer then "
+        "takes the least violation. So only one inequality may be violated at a time, or there must be a common "
+        "direction g as in the statement. A UGV straight under the UAV has no such direction; there its disturbance "
+        "does not matter, and the UAV's half suffices (`Gate.overhead`).",
+        "w is 10 % of the largest speed limit, but at most A/4 times the smallest safe distance (A/8 if a UGV may "
+        "stand because it misses a message), so that at least half of that distance is left. It is our choice, not a "
+        "property of a robot.",
         "Positions are measured exactly and without delay.",
-        "While a pair is out of sensing range, its robots command no more than their speed limits, and w comes on top. "
-        "The layer itself may ask for more within a safe distance of something else.",
+        "While a pair is out of sensing range, its robots command at most their speed limits, and w is added. Within a"
+        " safe distance of another body, the layer itself may command more.",
     )
     does_not_establish = (
-        "That the disturbance of a real robot stays below w; nor any distance from an obstacle that may move: the "
-        "report counts the periods in which a robot that was too near to one retreated fast enough; nor anything where "
-        "inequalities contradict each other: a disturbed robot can press another, whose half of the pair's inequality "
-        "has no room, into an obstacle, as far as contact. It does not bound how long a robot stays inside the safe "
-        "distance, nor how fast it recovers: the layer's velocities there are not limited."
+        "That the disturbance of a real robot stays below w. Any distance from an obstacle that may move: the report "
+        "counts the periods in which a robot too near to one retreated fast enough. Any distance if inequalities "
+        "contradict each other: a disturbed robot can push another one into an obstacle, up to contact. Bounds on how "
+        "long a robot stays inside the safe distance, or on its speed there."
     )
 
     theorems = (
@@ -113,7 +110,7 @@ class SafeDist(TheoremClaim):
         return {"least_distances_m": least}
 
     def seen_in(self, trace: Trace) -> tuple[int, int, int]:
-        """Periods too near to an obstacle that may move, and those of them with a retreat at w, and at w + V."""
+        """Numbers of periods too near to an obstacle that may move, with a retreat at w, and with one at w + V."""
         w = self.inputs(trace.scenario)["disturbance_m_s"]
         passive = once = kept = 0
         for periods in beside(trace):
@@ -133,7 +130,7 @@ class SafeDist(TheoremClaim):
 
 
 def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:
-    """d - W/A, m; with A/2 between UGVs of which one may stand for lack of a message."""
+    """d - W/A, m; with A/2 between UGVs if one may stand because it misses a message."""
     disturbed = 1 if pair.kind == "obstacle" else 2
     halved = 2 if pair.kind == "ugv_ugv" and inputs.get("ugvs_may_stand") else 1
     return pair.safe_m - disturbed * halved * decimal(inputs["disturbance_m_s"]) / decimal(inputs["avoidance_gain_1_s"])

@@ -77,14 +77,14 @@ class _Hypothesis:
         return np.flatnonzero(~(self.margin >= -self.slop))
 
     def at(self, k: int) -> dict[str, Any]:
-        """What is needed to redo the evaluation at instant k by hand."""
+        """The numbers to repeat the evaluation at instant k by hand."""
         other = {"second": self.others[k]} if self.others else {}
         described = {"hypothesis": self.name, **self.about, **other, "t_s": float(self.t[k])}
         return {**described, "margin": float(self.margin[k]), "unit": self.unit}
 
 
 class Guarantee(NamedTuple):
-    """The distance that is promised for a pair of bodies: their gap is `gap_m` or more at all times of the run."""
+    """The promised distance of a pair of bodies: their gap is at least `gap_m` at all times of the run."""
 
     pair: Pair  # the two bodies
     # How far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
@@ -98,7 +98,7 @@ class Guarantee(NamedTuple):
 
     @property
     def margin_m(self) -> float:
-        """The distance promised less the safe one; not positive."""
+        """The promised minus the safe distance; at most 0."""
         return self.gap_m - self.pair.required_m
 
 
@@ -107,17 +107,17 @@ class SafeHyp(TraceClaim):
     subject = "conditions of the proof"
     summary = "Every step of the run met the conditions under which the safety theorem (SAFE-INV) holds."
     statement = (
-        "At every control sample of the run the hypotheses of the safety theorem held, up to e per pair of bodies: so "
-        "each pair of robots and bodies at rest kept d - e / (A h) at all times of the run, A / 2 for A where one of "
-        "two robots may have to stand. Beside an obstacle that may move the passive law held, and it moved no faster "
-        "than declared: so d was kept in every period that began at d + V h or more. The controllers were built with "
-        "what the scenario says; one of the user's own is "
-        "judged by its steps alone. Where robots act on measured positions, the inequalities are those of the pair as "
-        "measured (beside an obstacle that may move: as measured and met for certain, or as it truly was), errors were "
-        "within their bound, and d is that of the true bodies. Where messages between UGVs may "
-        "be lost, a UGV stood unless it knew that those whose message it lacked were far. Where UGVs act on old "
-        "positions (`control.law: asynchronous`), each of their steps kept off all places where the other could be "
-        "until that one decided again, up to e, and two of them kept d less the sum of all e."
+        "At every control sample of the run the hypotheses of the safety theorem held, up to an error e for each "
+        "pair of bodies. So each pair of robots and static bodies kept d - e / (A h) at all times of the run, "
+        "with A / 2 for A if one of two robots may have to stand. Beside an obstacle that may move, the passive "
+        "law held and the obstacle was no faster than declared, so d was kept in every period that began at d + V "
+        "h or more. The controllers had the scenario's parameters; a controller of the user's own is judged by "
+        "its steps alone. If robots act on measured positions, the inequalities are about measured positions "
+        "(beside an obstacle that may move, about true or measured ones), the errors were within their bound, and "
+        "d is about true bodies. If messages between UGVs may be lost, a UGV stood unless it knew that the "
+        "senders of missing messages were far. If UGVs act on old positions (`control.law: asynchronous`), each "
+        "step avoided all points that the other could reach before it decided again, up to e, and the two kept d "
+        "minus the sum of all e."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -135,36 +135,36 @@ class SafeHyp(TraceClaim):
     )
     method = (
         "Exact arithmetic on the recorded positions at the control samples and on the corners of obstacles, which are "
-        "rational numbers; square roots are enclosed. Pairs and samples are left out if floats find them far apart, or "
-        "an inequality met by more than 1e-9 m. D and d are distances of a robot's centre from another centre, or from "
-        "a convex core: a point, a wall, a polygon or a prism; n is the unit vector away from its nearest point, "
-        "inside a polygon the normal of its nearest edge. A barrier of several parts has an inequality for each of "
-        "them, and keeps what all of them keep. The distances promised are listed less the radii. The parameters of "
-        "the controllers were read back from the diagram and are compared with the scenario. Rows less than 1e-9 s "
-        "apart count as one instant. With errors of positions D and n are those of measured ones and steps are true: a "
-        "pair meets the sum of its inequalities, with half the gain between two robots, or is far apart, or stands. "
-        "The same holds for two robots of which one may lack the other's message. Old positions are those that the "
-        "sender had at the recorded sample at which it sent the last message that arrived."
+        "rational numbers; square roots are enclosed. Pairs and samples are skipped if floating-point numbers show "
+        "that they are far apart, or that an inequality is met by more than 1e-9 m. D and d are distances of a robot's"
+        " centre from another centre, or from a convex core: a point, a wall, a polygon or a prism; n is the unit "
+        "vector away from its nearest point, inside a polygon the normal of its nearest edge. A barrier of several "
+        "parts has an inequality for each part, and the promised distance is the least over the parts. The radii are "
+        "subtracted from the listed distances. The parameters of the controllers were read back from the diagram and "
+        "are compared with the scenario. Rows less than 1e-9 s apart count as one instant. With position errors, D and"
+        " n are measured and steps are true: a pair meets the sum of its inequalities, with half the gain between two "
+        "robots, or is far apart, or stands. The same holds for two robots if one may miss the other's message. An old"
+        " position is the sender's position at the recorded sample of the last message that arrived."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions = (
         "The command of a row is the velocity applied since the row before (the trace's convention).",
-        "The points that the law steers move straight from row to row. Of robots that turn, lag or get their commands "
-        "late, D and d are those of these points: d_law of SAFE-BUDGET.",
+        "The points that the law steers move straight from row to row. For robots that turn, lag or receive commands "
+        "late, D and d are about these points: d is d_law of SAFE-BUDGET.",
         "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
-        "time on, and the safe start is that D >= d at that sample. The bodies of robots that lag, get their commands "
-        "late or never drive backwards must be clear then, too, and so must their ways under commands already given, "
-        "for the time of the delay. If they are not, nothing is promised for the pair.",
+        "time on, and the safe start is that D >= d at that sample. At that sample, the bodies of robots that lag, "
+        "receive commands late or never drive backwards must also be clear, and so must their paths during the delay "
+        "under commands already given. Otherwise nothing is promised for the pair.",
         "All robots act on the same measured positions, those that are recorded.",
-        "With `control.law: asynchronous` UGVs are discs that move as they are told, and what one hears of another one "
-        "was true when it was sent.",
-        "No safe start is asked beside an obstacle that may move: where it is near, the robot is passive.",
+        "With `control.law: asynchronous` UGVs are discs that follow commands exactly, and the positions that they "
+        "receive were exact when sent.",
+        "Beside an obstacle that may move no safe start is required, because the robot is passive near it.",
     )
     does_not_establish = (
-        "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). Broken hypotheses do not mean that the distance was "
+        "The theorem (SAFE-INV) and the outcome (SAFE-TRACE). A broken hypothesis does not mean that the distance was "
         "violated, only that no more than d - e / (A h) is promised: inside several safe distances at once the "
-        "inequalities can contradict each other. Nothing is said about other runs, and of the periods in which a robot "
-        "was passive only that it did not bring itself nearer (SAFE-OWN)."
+        "inequalities can contradict each other. It says nothing about other runs. For periods in which a robot was "
+        "passive, only SAFE-OWN applies."
     )
 
     theorems = (
@@ -219,7 +219,7 @@ class SafeHyp(TraceClaim):
 
 
 def _against(trace: Trace, first: dict[str, Any], broken: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The hypothesis broken first, with what is needed to redo it by hand."""
+    """The hypothesis broken first, with the numbers to repeat the evaluation by hand."""
     against = first | snapshot(trace, map(str, first.values()), first["t_s"])
     if first["hypothesis"] != DECLARED:
         return against
@@ -243,7 +243,7 @@ def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:
 def _shown(
     first: dict[str, Any] | None, worst: Sequence[dict[str, Any]], listed: Sequence[Any], kept: Sequence[Guarantee]
 ) -> dict[str, Any]:
-    """The entry with the finding's margin: that of the hypothesis broken first, or else of the inequalities."""
+    """The entry with the finding's margin: the hypothesis broken first, otherwise the inequalities."""
     if first and first["hypothesis"] == BUILT:
         return first
     name = first["hypothesis"] if first else AVOIDANCE
@@ -256,7 +256,7 @@ def _shown(
 
 
 def _listed(trace: Trace, promised: Guarantee) -> dict[str, Any]:
-    """A row of the evidence, with the sample at which the most was missed, if anything was."""
+    """A row of the evidence, with the sample of the largest violation, if any."""
     e, k = float(promised.missed_m.max()), int(np.argmax(promised.missed_m))
     pair, why = promised.pair, {"why": promised.why} if promised.why else {}
     described = {"first": pair.first, "second": pair.second, "safe_distance_m": pair.required_m}
@@ -269,13 +269,13 @@ def _finite(metres: float) -> float | None:
 
 
 def _gain(trace: Trace) -> Fraction:
-    """a = min(A h, 1), of the numbers as they are written."""
+    """a = min(A h, 1), of the exact decimals."""
     control = trace.scenario.control
     return min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
 
 
 def guarantees(trace: Trace) -> list[Guarantee]:
-    """The distance that is promised for each pair that comes near."""
+    """The promised distance of each pair that comes near."""
     # Other pairs stay so far apart that the longest steps of both could not break their distance.
     return trace.derived("guarantees", lambda: list(_guarantees(trace)))
 
@@ -328,7 +328,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
 
 
 def _unsure_m(trace: Trace, pair: Pair) -> float:
-    """The largest way that one of two UGVs had to reckon with of the other one, m; inf if it had no position of it."""
+    """The largest uncertainty of one UGV's position for the other, m; inf without a received position."""
     both_ways = [*permutations((pair.first, pair.second))]
     if any((heard_at(trace, *names) < 0).any() for names in both_ways):
         return inf
@@ -336,7 +336,7 @@ def _unsure_m(trace: Trace, pair: Pair) -> float:
 
 
 def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
-    """What two UGVs keep that act on old positions of each other: theorem Async.old_positions."""
+    """The distance that two UGVs keep under the asynchronous law: theorem Async.old_positions."""
     missed = missed_m(trace, pair.first, pair.second, pair.law_m) + missed_m(trace, pair.second, pair.first, pair.law_m)
     places = [trace.position(name)[0] for name in (pair.first, pair.second)]
     short = shortage(places[0], places[1], pair.law_m)
@@ -347,7 +347,7 @@ def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
 
 
 def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> tuple[Array, Array]:
-    """Places of a pair that robots act on at the samples, (K, 3), m, each."""
+    """Measured positions of a pair at the samples, (K, 3), m, each."""
     samples = slice(there.start, there.stop - 1)
     own = trace.as_seen(pair.first, pair.first)[samples]
     other = trace.as_seen(pair.first, pair.second)[samples] if pair.second in trace.robots else None
@@ -355,7 +355,7 @@ def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> tuple[Array, 
 
 
 def _bears_errors(pair: Pair, gain: Fraction, lost: Fraction) -> bool:
-    """Whether err (1 - A h) <= A h kept, where the points keep d_law - err less what is lost, drifts included."""
+    """Whether err (1 - A h) <= A h kept, where kept is d_law - err minus losses and drifts."""
     error = Fraction(pair.error_m)
     kept = Fraction(pair.law_m) - error - Fraction(pair.drift_m) - lost
     return error < kept and error * (1 - gain) <= gain * kept
@@ -364,7 +364,7 @@ def _bears_errors(pair: Pair, gain: Fraction, lost: Fraction) -> bool:
 def _beside(
     trace: Trace, pair: Pair, places: dict[str, Array], there: slice, reach: float
 ) -> list[tuple[Array, Cores]]:
-    """What the first body of a pair keeps away from: places of the second and its core, or each part of a barrier."""
+    """The obstacles of the first body of a pair: positions and core of the second, or of each part of a barrier."""
     # Parts that stay beyond reach of the way of the first are left out. A point is given by its place.
     if pair.second in places:
         return [(places[pair.second][there], POINT)]
@@ -384,7 +384,7 @@ def _longest(places: Array, last: float) -> float:
 
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
-    """The distance that is lost, m, because a sample misses the inequalities."""
+    """The lost distance, m, because a sample violates the inequalities."""
     t, bounds = trace.sampled("t_s"), bounds_of(trace)
     for promised in kept:
         pair, missed_m = promised.pair, promised.missed_m
@@ -396,7 +396,7 @@ def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]
 
 
 def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
-    """Beside obstacles that may move: the passive law, and that they move no faster than declared."""
+    """Beside obstacles that may move: the passive law, and their declared speeds."""
     period_s, ends = trace.scenario.control.period_s, period_ends(trace)
     for periods in beside(trace):
         about = {"first": periods.pair.first, "second": periods.pair.second}
@@ -410,7 +410,7 @@ def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
 
 
 def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
-    """How many avoidance inequalities were in range of a robot, and how many bound a command, by who avoided whom."""
+    """Numbers of avoidance inequalities in range, and of those that limited a command, by pair."""
     count = {"ugv beside obstacle": 0, "uav beside obstacle": 0}
     count |= {"ugv beside ugv": 0, "ugv beside uav": 0, "uav beside ugv": 0}
     count |= {"uav beside uav": 0} if len(trace.uavs) > 1 else {}
@@ -485,7 +485,7 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
 
 
 def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
-    """UGVs stand where they lack a message of another one that is not surely far."""
+    """UGVs stand if they miss a message of another one that is not certainly far."""
     if trace.scenario.asynchronous or trace.scenario.ugv_links is None or not trace.scenario.ugv_links.loss:
         return
     t, period, bounds = trace.sampled("t_s"), trace.scenario.control.period_s, bounds_of(trace)
@@ -504,7 +504,7 @@ def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
 
 
 def error_margins(trace: Trace, robot: str) -> Array:
-    """By how much the errors of a robot's measured positions are below their bound, (S,), m; exact in their signs."""
+    """Margins of a robot's position errors to their bound, (S,), m, with exact signs."""
     most = decimal(trace.scenario.position_error_m)
     seen, true = trace.as_seen(robot, robot).tolist(), trace.position(robot)[trace.sample_rows].tolist()
     margins = list[float]()
@@ -517,7 +517,7 @@ def error_margins(trace: Trace, robot: str) -> Array:
 
 
 def least_shares(trace: Trace) -> list[dict[str, Any]]:
-    """The least share s that was left of each command that is shortened, 1 in full, and the gain s A of recoveries."""
+    """The least factor s by which commands were shortened (1: not), and the recovery gain s A."""
     gain = trace.scenario.control.avoidance_gain_1_s
     names = [ugv for ugv in trace.ugvs if trace.plant(ugv).steering is not None]
     shares = {name: float(trace.sampled(f"{name}.command_share").min()) for name in names}
@@ -525,7 +525,7 @@ def least_shares(trace: Trace) -> list[dict[str, Any]]:
 
 
 def own_plants(trace: Trace) -> list[dict[str, Any]]:
-    """The largest drift and cover of each robot with a user's plant, and what is declared."""
+    """The largest and the declared drift and cover of each robot with a user's plant."""
     plants = []
     for name, robot in trace.scenario.robots.items():
         if measured := trace.plant(name).measured:
@@ -554,7 +554,7 @@ def _of_plants(trace: Trace) -> Iterator[_Hypothesis]:
 
 
 def _covers(trace: Trace, robot: str) -> Iterator[Premise]:
-    """A body is no farther from the point that the law steers than the law accounts for."""
+    """A body stays within its cover of the steered point."""
     if trace.is_apart(robot) and not trace.plant(robot).measured:
         away = np.linalg.norm(trace.body(robot) - trace.position(robot), axis=1)
         yield Premise("cover of the body", "m", trace.t, bounds_of(trace)[robot].rolling_m - away)

@@ -21,13 +21,14 @@ class SafeInv(TheoremClaim):
     subject = "proof of distances"
     summary = "A robot that obeys the avoidance inequalities and starts at a safe distance keeps it."
     statement = (
-        "Any number of robots and obstacles at rest whose pairs start at their safe distances keep them at all times, "
-        "if at every sample each pair in sensing range meets its avoidance inequalities and velocities are held until "
-        "the next. Inside a safe distance the deficit shrinks by the factor 1 - A h per period and never grows. Two "
-        "robots take half of an inequality each; a UGV under a UAV has no vertical velocity. Pairs beyond the sensing "
-        "range need no inequality. An obstacle is a convex set, or several: a point, a wall, a polygon or a prism, "
-        "each with an inequality of its own. All this rests on a lemma: on a straight line the distance from a convex "
-        "set is at least its value at the start plus the time times its rate of change at the start."
+        "Let any number of robots and static obstacles start at their safe distances. At every sample let each pair in"
+        " sensing range meet its avoidance inequalities, and let velocities be held until the next sample. Then all "
+        "pairs keep their safe distances at all times. Inside a safe distance the deficit never grows, and shrinks by "
+        "the factor 1 - A h per period. Two robots take half of an inequality each; a UGV under a UAV has no vertical "
+        "velocity. Pairs beyond the sensing range need no inequality. An obstacle consists of one or more convex sets "
+        "(points, walls, polygons or prisms), each with its own inequality. The proof uses one lemma: along a straight"
+        " line, the distance from a convex set is at least its initial value plus time times its initial rate of "
+        "change."
     )
     latex: tuple[str, ...] = (
         r"\mathrm{dist}(p + s v) \ge D + s \, n^\top v, \quad D = \mathrm{dist}(p), \quad s \ge 0",
@@ -40,23 +41,23 @@ class SafeInv(TheoremClaim):
     )
     method = (
         "Theorems in Coq, for all positions, times and numbers of bodies. The hypotheses about the scenario are "
-        "checked here in exact arithmetic, safe distances above 0 among them: no pair is at one point. Those about a "
-        "run are SAFE-HYP."
+        "checked here in exact arithmetic, including safe distances above 0. SAFE-HYP checks the hypotheses about a "
+        "run."
     )
     equations = "(7)-(8), (11) in the inequality form of the package (set-based avoidance)"
     assumptions: tuple[str, ...] = (
         "Positions are integrals of the commands, which are held between samples; all robots are sampled at the same "
         "instants.",
-        "Obstacles stand still: a pair with one that may move is not covered (SAFE-OWN says what a robot keeps there). "
-        "Two UGVs that act on old positions of each other are no such pair either (SAFE-BUDGET is about them). "
-        "Robots obey their speed limits: pairs out of range rely on that. D is the distance of "
-        "a robot's centre from the other's centre or, signed, from an obstacle's convex core. All radii are part of d.",
+        "Obstacles are static: pairs with an obstacle that may move are not covered (see SAFE-OWN), and neither are "
+        "two UGVs that act on old positions of each other (see SAFE-BUDGET). Robots obey their speed limits, which "
+        "pairs out of range need. D is the distance of a robot's centre from the other's centre or, signed, from an "
+        "obstacle's convex core. All radii are part of d.",
         "A UGV's velocity has no z component.",
     )
     does_not_establish = (
         "That the inequalities hold in a run, with rounding and in the built controllers (SAFE-HYP), or under "
         "disturbance (SAFE-DIST). Inside two safe distances at once there may be no velocity that meets both "
-        "inequalities. That the program computes these inequalities is for tests and SAFE-HYP to show."
+        "inequalities. Whether the program computes these inequalities is checked by tests and SAFE-HYP."
     )
 
     theorems: tuple[str, ...] = (

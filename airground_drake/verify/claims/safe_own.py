@@ -1,4 +1,4 @@
-"""SAFE-OWN: what the robots themselves did to the distances of a run in which obstacles may move."""
+"""SAFE-OWN: the robots' own effect on the distances of a run in which obstacles may move."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -19,15 +19,14 @@ MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margi
 class SafeOwn(TraceClaim):
     id = "SAFE-OWN"
     subject = "the robots' own doing"
-    summary = "No robot itself brought a distance below the required one, whatever the obstacles that move did."
+    summary = "No robot broke a required distance by its own motion, whatever the moving obstacles did."
     statement = (
-        "In every control period, with the other body held where it was at the control sample, no robot came nearer "
-        "to it than min(D, d + V h). D is the distance at the sample, d the required one, and V the largest speed at "
-        "which the other body is expected to move (0 for robots and bodies at rest). Any further loss is the other "
-        "body's motion. Where a body is not where the law steers it, D is the distance of the steered points less "
-        "what the plants take, or the distance of the bodies if that is smaller already. Where the distance was "
-        "broken, no robot's body came nearer than min(D, d) by its own motion, including commands under way; there D "
-        "is the distance of the bodies."
+        "In every control period no robot came closer than min(D, d + V h) to the other body's position at the control"
+        " sample. D is the distance at the sample, d the required one, and V the largest expected speed of the other "
+        "body (0 for robots and static bodies). Any further loss is due to the other body's motion. For a body off its"
+        " steered point, D is the distance of the steered points minus the cost of the plants, or the distance of the "
+        "bodies if that is smaller. If the distance was broken, no robot's body came closer than min(D, d) by its own "
+        "motion, including earlier commands; here D is the distance of the bodies."
     )
     latex = (
         r"\mathrm{dist}(p_i(t_k + s), C_j(t_k)) \ge \min(D_k, \, d_{ij} + V_j h) - 10^{-9} \text{ m}, \quad "
@@ -37,25 +36,26 @@ class SafeOwn(TraceClaim):
     )
     method = (
         "Exact minimum of the distance on every segment between two rows, in closed form as in SAFE-TRACE, from the "
-        "other body as it was at the control sample before. It is asked of every robot of every pair that comes so "
-        "near that its longest step could matter."
+        "other body's position at the previous control sample. It is computed for every robot of every pair that comes"
+        " so near that the robot's longest step could matter."
     )
     equations = "(7)-(8), (11); n.v >= 0 beside obstacles that may move"
     assumptions = (
         "Those of SAFE-TRACE. Obstacles move without turning, as recorded.",
-        "The theorem promises nothing of what a lag, a delay or a hand point covers: there the run decides alone.",
+        "The theorem promises nothing within the cover of a lag, a delay or a hand point; there only the run is "
+        "judged.",
         "V is the declared speed (`max_speed_m_s`), whether it is true or not: SAFE-HYP compares it with the run.",
     )
     does_not_establish = (
-        "That a distance was kept (SAFE-TRACE does): an obstacle that moves can come as near as it likes. That a robot "
-        "got out of its way. It says nothing about any other run."
+        "That a distance was kept (SAFE-TRACE does): a moving obstacle can come arbitrarily close. That a robot gave "
+        "way. It says nothing about other runs."
     )
 
     theorems = ("Passive.own_doing", "Passive.since", "Turning.shortened_obeys", "Plants.unicycle_stands")
     exercised_by = "control periods in which an obstacle that may move was within reach"
 
     def applies(self, trace: Trace) -> bool:
-        """Only a run with obstacles that may move; else SAFE-TRACE says the same."""
+        """Only for runs with obstacles that may move; otherwise SAFE-TRACE suffices."""
         try:
             return any(barrier.expected_speed_m_s > 0.0 for barrier in trace.scenario.barriers.values())
         except TraceError:

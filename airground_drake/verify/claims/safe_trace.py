@@ -38,35 +38,35 @@ class SafeTrace(TraceClaim):
         "Exact minimum of the distance of the bodies on every segment between two rows, in closed form: nothing is "
         "sampled. A straight motion is nearest to a convex core at an end, where it passes a corner or an edge at "
         "right angles, or where it crosses the line of an edge; in a polygon, it is deepest where two edges are "
-        "equally near. A barrier is as near as the nearest of its convex parts. A body that turns or lags leaves the "
-        "straight line. Its distance is reduced by that much; where the result may be too small, the segment is "
-        "divided until it is straight to 1e-10 m. First of all, each recorded step of a steered point must equal "
-        "command times duration, and each recorded body must follow by its plant, to 1e-9 m; otherwise the verdict is "
-        "`error`."
+        "equally near. The distance from a barrier is the least over its convex parts. A body that turns or lags "
+        "leaves the straight line, so its distance is reduced by this deviation; if the result may be too small, the "
+        "segment is divided until it is straight to 1e-10 m. Before that, each recorded step of a steered point must "
+        "equal command times duration, and each recorded body must obey its plant, to 1e-9 m; otherwise the verdict is"
+        " `error`."
     )
     equations = "(7)-(8), (11)"
     assumptions = (
         "Between two rows every robot moves on a straight line at constant speed (integrator plant, zero-order hold), "
-        "a unicycle on an arc, a body with a lag as the equation of the lag says. So does a user's plant, whose "
-        "rows are the steps of an integrator with error control.",
+        "a unicycle on an arc, and a body with a lag by the equation of the lag. A user's plant moves straight between"
+        " rows, which are the steps of an integrator with error control.",
         "Robots are balls of the scenario's radii r (`radius_m`; by default points), and C is the centre of the other "
-        "body. A barrier is all that is within its radius of its core C: a point, walls, a polygon, or a prism up to "
-        "its height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own "
+        "body. A barrier consists of all points within its radius of its core C: a point, walls, a polygon, or a prism"
+        " up to its height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own "
         "`distance_m`, or the safe distance of the kind of pair.",
-        "For a UGV, walls have no end in height. Obstacles stand still for the whole run, as the scenario lists them, "
-        "or move without turning as the trace says, straight between two rows. An obstacle with `appears_s` is judged "
-        "from the first control sample at or after that time on, one with `disappears_s` up to the first at or after "
-        "that time, both instants included.",
+        "For a UGV, walls are infinitely high. Obstacles are static for the whole run, as listed in the scenario, or "
+        "move without rotation as recorded in the trace, straight between two rows. An obstacle with `appears_s` is "
+        "judged from the first control sample at or after that time on, one with `disappears_s` up to the first at or "
+        "after that time, both instants included.",
     )
     does_not_establish = (
         "Safety of any other run, start or seed, or of a plant that does not follow its velocity exactly (SAFE-DIST); "
-        "nor that positions in the trace are those of a real robot. It says nothing about why the distance was kept. "
-        "Beside obstacles that move a refutation does not mean that a robot did anything wrong (SAFE-OWN)."
+        "nor that positions in the trace are those of a real robot. It does not explain why the distance was kept. "
+        "Beside moving obstacles a refutation does not mean that a robot caused it (SAFE-OWN)."
     )
 
     exercised_by = (
-        "pairs that came so close that one control period at full speed would have broken the distance, or what the "
-        "law keeps between the points that it steers"
+        "pairs that came so close that one control period at full speed would have broken the distance, or the law's "
+        "distance between steered points"
     )
 
     def check(self, trace: Trace) -> Finding:
@@ -102,7 +102,7 @@ class SafeTrace(TraceClaim):
 
 @dataclass(frozen=True)
 class Distance:
-    """Where a pair was closest, in row `row`: distances of surfaces, m, and the time, s."""
+    """The closest approach of a pair, in row `row`: distances of surfaces, m, and the time, s."""
 
     # It was exercised if one control period at full speed would have broken the safe distance, or that of the law.
 
@@ -118,12 +118,12 @@ class Distance:
 
 @per_trace
 def _entry(trace: Trace, k: int) -> Distance:
-    """Where the k-th pair was closest."""
+    """The closest approach of the k-th pair."""
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
     near = margin_m < pair.reach_m or (pair.more_m > 0.0 and steered_margin(trace, pair) < pair.reach_m)
     return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, near)
 
 
 def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:
-    """Where on the map, if it is about the map."""
+    """The place on the map, for pairs with the map."""
     return place_on_map(trace, worst.first, worst.t_s) if worst.second == MAP else {}

@@ -1,4 +1,4 @@
-"""THR-CHOICE: whether the threshold in force is the right one for the scenario's own numbers, and for its runs."""
+"""THR-CHOICE: whether the threshold in force is optimal for the scenario's numbers, and for its runs."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -30,7 +30,7 @@ Row = dict[str, float]
 class ThrChoice(ModelClaim):
     id = "THR-CHOICE"
     subject = "choice of the threshold"
-    summary = "The threshold in force is the best one for the scenario's own numbers, or it is declared by the user."
+    summary = "The threshold in force is optimal for the scenario's own numbers, or the user declared it."
     statement = (
         "The threshold in force minimises the Bayes risk for the scenario's own c1, c2, drift and noise, or the user "
         "declared it: the rule `fixed` takes a number, the rule `printed` takes (19) as the paper prints it."
@@ -39,16 +39,17 @@ class ThrChoice(ModelClaim):
         r"\text{rule bayes: } B(\zeta) = \min_z B(z), \quad \text{otherwise } B(\zeta) - \min_z B(z) \text{ is shown}",
     )
     method = (
-        "The optimum is the root of (19) with c2/c1, enclosed by two signs in ball arithmetic (THR-ROOT, THR-OPT). The "
-        "threshold in force equals it to 1e-6 (relative), or it is declared. A declared threshold cannot be refuted, "
-        "so it counts as not exercised. Each run then shows the drift that the task error had in the last second "
-        "before it first reached the threshold, the noise, the optimum for both, and what the threshold costs."
+        "The optimum is the root of (19) with c2/c1, enclosed by two signs in ball arithmetic (THR-ROOT, THR-OPT). The"
+        " threshold in force equals it to 1e-6 (relative), or it is declared. A declared threshold cannot be refuted, "
+        "so it counts as not exercised. For each run the report shows the drift of the task error in the last second "
+        "before it first reached the threshold, the noise, the optimum for both, and the cost of the threshold in "
+        "force."
     )
     equations = "(16)-(20), Table 1"
     assumptions = ("Drift and noise of the rule are those that the user assumes; (16)-(18) without initial deviation.",)
     does_not_establish = (
-        "That the assumed drift and noise are those of the runs: compare the rows of the runs. A declared threshold "
-        "need not be optimal. The risk says nothing about what an intervention brings."
+        "That the assumed drift and noise agree with the runs: compare the rows of the runs. A declared threshold need"
+        " not be optimal. The risk does not measure the benefit of an intervention."
     )
     expected: Status = "holds"
     exercised_by = "thresholds that are, or must be, the optimum"
@@ -88,7 +89,7 @@ class ThrChoice(ModelClaim):
         )
 
     def seen_in(self, trace: Trace) -> dict[str, Row]:
-        """What the drift and the noise of UGVs say whose task error grew to the threshold, by `run UGV`."""
+        """The optimal threshold for drift and noise of UGVs whose task error reached the threshold, by `run UGV`."""
         decision, zeta = trace.scenario.decision, float(trace.meta["zeta_m"])
         drifts = {ugv: drift_of(task_error(trace, ugv), zeta) for ugv in trace.ugvs}
         return {
@@ -125,7 +126,7 @@ def _chart(evidence: dict[str, Any], numbers: Sequence[float]) -> Chart:
 
 
 def measured(zeta: float, drift: float, noise: float, rule: Threshold) -> Row:
-    """What a drift, m/s, positive, and a noise, m/sqrt(s), say of a threshold, m, with the costs of a rule."""
+    """The evaluation of a threshold, m, for a positive drift, m/s, a noise, m/sqrt(s), and the costs of a rule."""
     optimum, extra = 0.0, rule.c1_1_s * zeta / drift  # without noise: decided after zeta / drift, never wrongly
     if noise > 0.0:
         numbers = drift, noise, rule.c1_1_s, rule.c2

@@ -122,10 +122,10 @@ Formulas = Callable[[PassageExperiment], tuple[float, float]]
 
 class ThrDdm(ModelClaim):
     id = "THR-DDM"
-    summary = "Simulated decisions take as long, and err as often, as the formulas say."
+    summary = "Simulated decisions have the decision time and the error rate of the formulas."
     statement = (
-        "Simulated paths of the decision variable, with and without initial deviation, have the mean decision time and "
-        "the error rate of the formulas that the threshold rests on."
+        "Simulated paths of the decision variable, with and without initial deviation, have the mean decision time and"
+        " the error rate of the formulas from which the threshold is computed."
     )
     latex = (
         r"\mathbb{E}[\min \{t : |x(t)| \ge \zeta\}] = T_{(17)}, \quad \mathbb{P}[x(t) = -\zeta] = E_{(18)}",

@@ -27,9 +27,9 @@ class ThrOpt(TheoremClaim):
         r"\text{ for some } \zeta",
     )
     method = (
-        "Theorems in Coq. Checked here, by signs in ball arithmetic: where both roots are, and a lower bound on how "
-        "much higher the risk at the printed root is. The drifts for which the threshold in force solves the equation, "
-        "at most two, are enclosed, too."
+        "Theorems in Coq. Signs in ball arithmetic enclose both roots, and give a lower bound of the additional risk "
+        "at the printed root. The drifts for which the threshold in force solves the equation, at most two, are "
+        "enclosed as well."
     )
     equations = "(16)-(19)"
     assumptions = (

@@ -50,7 +50,7 @@ class Decided:
 class ThrQuality(TraceClaim):
     id = "THR-QUALITY"
     subject = "timing of triggers"
-    summary = "The UAV stepped in when the real task error, without noise, was about at the threshold."
+    summary = "The UAV intervened when the real task error, without noise, was close to the threshold."
     statement = (
         "The task error without noise agreed with the threshold to within the width of the hysteresis: no trigger "
         "came at a smaller error, and while the UAV watched, no larger error went without a trigger."
@@ -65,22 +65,22 @@ class ThrQuality(TraceClaim):
         "e is rebuilt from positions and preset, exactly in continuous time. An excursion starts when e reaches zeta "
         "while the UAV watches, and ends when e falls below the release level. A trigger in an excursion is late by "
         "the time since its start. Outside, it is early if e >= zeta - w or if e reaches zeta before the release, and "
-        "false otherwise. An excursion without a trigger is missed if e exceeds zeta + w. An error that is above when "
-        "a watch starts, as at the end of a dwell, counts from then: a trigger at once is not late. Share of false and "
-        "missed, and decision times, stand beside (17)-(18) for the noise of the run and its drift: the growth of e "
-        "in the last second before it first reaches zeta."
+        "false otherwise. An excursion without a trigger is missed if e exceeds zeta + w. If e is at least zeta when a"
+        " watch starts, as at the end of a dwell, the excursion starts then, and an immediate trigger is not late. The"
+        " shares of false and missed triggers, and decision times, are compared with (17)-(18) for the noise of the "
+        "run and its drift: the growth of e in the last second before it first reaches zeta."
     )
     equations = "(15), (17)-(18), (20)"
     assumptions = (
         "Positions are linear in time between rows.",
         "The trace records every trigger and release (THR-TRIG recomputes them).",
-        "(17)-(18) have a constant drift, two thresholds, no leak, and no noise before the drift begins. In a run the "
-        "noise accumulates from t = 0, so that errors can be much more frequent.",
+        "(17)-(18) assume a constant drift, two thresholds, no leak, and no noise before the drift begins. In a run "
+        "the noise accumulates from t = 0, so errors can be much more frequent.",
     )
     does_not_establish = (
-        "That the threshold is a good one (THR-CHOICE), or that another seed does as well. An intervention changes the "
-        "error: a false trigger may have prevented an excursion. Excursions within the dwell after a trigger are not "
-        "looked at, nor whether releases were right. A handful of triggers is no estimate of (17)-(18): THR-DDM is."
+        "That the threshold is a good one (THR-CHOICE), or that another seed does as well. An intervention changes the"
+        " error: a false trigger may have prevented an excursion. Excursions within the dwell after a trigger, and "
+        "releases, are not judged. A few triggers are no estimate of (17)-(18); see THR-DDM."
     )
     exercised_by = "triggers, and excursions without one"
 
@@ -189,7 +189,7 @@ class Judge:
             yield Decided(self.robot, over, "missed", peak, peak - self.zeta, over - begun)
 
     def _trigger(self, time: float, begun: float | None, released: float) -> Decided:
-        """A trigger; `begun`: start of the excursion that it serves, None outside."""
+        """The decision of a trigger; `begun` is the start of its excursion, None outside of one."""
         error = float(self.e.at(time))
         if begun is not None:
             late = time - begun
@@ -224,7 +224,7 @@ def drift_of(e: NormSignal, zeta: float) -> float | None:
 
 
 def _ddm(decisions: Sequence[Decided], zeta: float, drift: float, noise: float) -> dict[str, float | None]:
-    """The decisions about a UGV beside (17)-(18), without initial deviation."""
+    """The decisions about a UGV compared with (17)-(18), without initial deviation."""
     alone = zeta / drift
     scale = alone * (drift / noise) ** 2 if noise > 0.0 else math.inf
     late = [decided.late_s for decided in decisions if decided.late_s is not None and decided.kind != "missed"]

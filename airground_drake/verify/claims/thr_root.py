@@ -31,7 +31,7 @@ class ThrRoot(TheoremClaim):
     equations = "(19) with c2/c1 for the printed c1/c2"
     assumptions = (
         "Constants are the decimal numbers as which the scenario's values print.",
-        "With a fixed threshold the root is not in force; it then says which threshold the rule's numbers ask for.",
+        "With a fixed threshold the root is not in force; it is then the threshold that the rule's numbers would give.",
     )
     does_not_establish = (
         "That the root minimises anything (THR-OPT), that drift and noise of the rule describe a robot, or that a "

@@ -53,12 +53,14 @@ def _is_root(rule: Threshold, zeta: float) -> bool:
 class ThrTrig(TraceClaim):
     id = "THR-TRIG"
     subject = "triggers"
-    summary = "The UAV stepped in exactly when the error reached the threshold: never late, never without cause."
+    summary = (
+        "The UAV intervened exactly when the decision variable reached the threshold: never late, never without cause."
+    )
     statement = (
-        "The UAV triggered exactly when the decision variable reached the threshold, none missing and none spurious; "
-        "a crossing inside the minimum inter-event time triggers at its end if the variable is still above. Between "
-        "two updates no crossing is missed, however briefly the variable is beyond the level, and none is invented. "
-        "The noise in the variable moves as (15) has it, by one sample for each of its periods."
+        "The UAV triggered exactly when the decision variable reached the threshold, without missing or spurious "
+        "triggers. After a crossing within the minimum inter-event time, it triggered at the end of this time if the "
+        "variable was still above. No crossing between two updates was missed, however short, and none was invented. "
+        "The noise in the variable obeys (15), with one sample for each of its periods."
     )
     latex = (
         r"x(t) = \lVert \rho_{rd}(t) - \rho(t) \rVert + n(t)",
@@ -72,13 +74,13 @@ class ThrTrig(TraceClaim):
         "(15) is rebuilt from positions, noise and the scenario's preset. The recorded x, the signal that the trigger "
         "has, is compared with it at every row: `port_against_15` in the evidence. If they agree, the rebuilt x is "
         "used between rows, too; if not, or if another block computes x, x is taken as linear between rows. It is cut "
-        "at the preset's corners and at its turning points (closed form) into monotone pieces; crossings are then sign "
-        "changes, located by Brent's method to 1e-12 s. The automaton is run again on x, and its events and the mode "
-        "column are compared one by one. All rows within one period of the noise must show the same sample of it, once "
-        "the leak is taken into account. Theorems in Coq say why the running trigger misses nothing in a step: its "
-        "largest value is at an end, and its least one has a closed form, with p the distance of the error's line from "
-        "0, k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). The evidence has their hypotheses: the noise changes its "
-        "rate at control samples only. Tests compare the running trigger with dense sampling."
+        "at the preset's corners and at its turning points (closed form) into monotone pieces; crossings are then sign"
+        " changes, located by Brent's method to 1e-12 s. The automaton is run again on x, and its events and the mode "
+        "column are compared one by one. All rows within one noise period must contain the same noise sample, after "
+        "correction for the leak. Theorems in Coq show that the running trigger misses nothing in a step: the largest "
+        "value of x is at an end, and the least one has a closed form, with p the distance of the error's line from 0,"
+        " k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). The evidence has their hypotheses: the noise changes its rate"
+        " at control samples only. Tests compare the running trigger with dense sampling."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -86,15 +88,15 @@ class ThrTrig(TraceClaim):
         "The threshold in force is the one recorded in the trace: the scenario's, or the root of (19) by its rule.",
         "Events in the last 1e-5 s of the run may be on either side of its end.",
         "Where another block computes x (`decision_block` in the trace), x is linear in time between rows.",
-        "Drake isolates a witness that has changed its sign over a step; crossings are then late by 1e-6 s at most, "
-        "and by 1e-9 s in steps shorter than that, which are not looked into.",
+        "Drake locates the sign change of a witness within a step; crossings are then late by at most 1e-6 s, or by at"
+        " most 1e-9 s in steps shorter than that, which Drake does not search.",
     )
     does_not_establish = (
-        "That the threshold is a good one (THR-CHOICE); that the noise has the stated distribution (THR-DDM), "
-        "or the stated leak if no period of the noise has a row within; or anything about a Wiener path between the "
-        "noise samples. If x only touches a level up to rounding, 1e-12 m, the verdict follows the rounding. Two "
-        "crossings closer than the isolation, 1e-6 s, may be taken at one instant. Where a hypothesis fails, "
-        "the theorems say nothing about other runs of the scenario."
+        "That the threshold is a good one (THR-CHOICE); that the noise has the stated distribution (THR-DDM), or the "
+        "stated leak if no period of the noise has a row within; or anything about a Wiener path between the noise "
+        "samples. If x only touches a level to within rounding, 1e-12 m, the verdict depends on rounding. Two "
+        "crossings less than 1e-6 s apart may be treated as simultaneous. If a hypothesis fails, the theorems say "
+        "nothing about other runs of the scenario."
     )
 
     theorems = ("Isolation.largest_at_an_end", "Isolation.nowhere_below", "Isolation.attained")
@@ -128,7 +130,7 @@ class ThrTrig(TraceClaim):
 
 
 def isolation(noise_period_s: float, period_s: float, levels: TriggerLevels) -> dict[str, Any]:
-    """Whether the theorems of Isolation.v apply here, in words, and their hypotheses."""
+    """Whether the theorems of Isolation.v apply, in words, and their hypotheses."""
     steps = decimal(noise_period_s) / decimal(period_s)
     says = f"the noise period is a whole number of control periods: {float(steps):g}"
     hypotheses = [
@@ -163,7 +165,7 @@ def levels_by(decision: Decision, zeta: float) -> TriggerLevels:
 
 
 def _block(trace: Trace) -> str:
-    """The block that computes the decision variable in place of (15); '' for (15) itself."""
+    """The name of the block that computes the decision variable; '' for (15) itself."""
     return str(trace.meta.get("decision_block", ""))
 
 
@@ -230,7 +232,7 @@ def _compare(expected: list[Transition], recorded: list[Transition], x: NormSign
 
 
 def _variable(trace: Trace, ugv: str) -> tuple[NormSignal, dict[str, Any], Conflict | None]:
-    """The decision variable that the trigger had, how it compares with (15), and the first row at which it differs."""
+    """The trigger's decision variable, its comparison with (15), and the first row that differs."""
     recorded = recorded_variable(trace, ugv)
     if _block(trace):
         return recorded, {"status": "not_run", "reason": "another block computes the decision variable"}, None

@@ -14,31 +14,31 @@ SHORTEST_S = 1e-3
 class ZenoProof(TheoremClaim):
     id = "ZENO-PROOF"
     subject = "proof of gaps between triggers"
-    summary = "Triggers never pile up: two are at least the minimum inter-event time apart, whatever the noise."
+    summary = "Two triggers are at least the minimum inter-event time apart, whatever the noise."
     statement = (
-        "Triggers i < j of a UGV are at least (j - i) times the minimum inter-event time apart, whatever the decision "
-        "variable does, so that there are at most floor(T/dwell) + 1 in a time T and no run is Zeno."
+        "Triggers i < j of a UGV are at least (j - i) times the minimum inter-event time (the dwell) apart, whatever "
+        "the decision variable does. So there are at most floor(T/dwell) + 1 triggers in a time T, and no run is Zeno."
     )
     latex = (
         r"x : [0, \infty) \to \mathbb{R} \text{ arbitrary} \; \Rightarrow \; t_j - t_i \ge (j - i) \tau_{\min}",
         r"N(T) \le \lfloor T / \tau_{\min} \rfloor + 1",
     )
     method = (
-        "Theorems in Coq about the automaton, by induction over any events at any times. Checked here: the dwell in "
-        "force is the minimum inter-event time, and above 0. Tests read the transitions off the running `Trigger` and "
-        "compare them with the theorem's. A bare threshold is refuted by a run of the automaton."
+        "Theorems in Coq about the automaton, by induction over any events at any times. This claim checks that the "
+        "dwell in force is the minimum inter-event time, and above 0. Tests compare the transitions of the running "
+        "`Trigger` with the theorem's. For a bare threshold, a run of the automaton is the counterexample."
     )
     equations = "(20)"
     assumptions = (
         "Time never runs backwards.",
         "x is any number at any time: no bound on the noise or its rate is used.",
-        "Triggers are the times at which the automaton enters INTERVENING. The simulator's event isolation, 1e-6 s, "
-        "delays them against the crossings of x; it brings no two of them closer than the dwell, because guards and "
+        "Triggers are the times at which the automaton enters INTERVENING. The simulator locates crossings of x to "
+        "1e-6 s, which delays triggers. It brings no two of them closer than the dwell, because guards and "
         "triggered_at use the time of the event itself.",
     )
     does_not_establish = (
-        "That a trigger comes when it should (THR-TRIG), or that the bare threshold is Zeno (ZENO-REFINE shows how its "
-        "events multiply). The end of a dwell is rounded, by about 1e-15 s: ZENO-TRACE measures gaps to 1e-9 s."
+        "That triggers come at the right time (THR-TRIG), or that the bare threshold is Zeno (ZENO-REFINE measures how"
+        " its events multiply). The end of a dwell is rounded, by about 1e-15 s: ZENO-TRACE measures gaps to 1e-9 s."
     )
 
     theorems = ("Trigger.dwell_apart", "Trigger.at_most")

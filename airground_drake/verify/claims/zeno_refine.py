@@ -165,7 +165,7 @@ def counts(setting: Refinement) -> dict[str, Array]:
 class ZenoRefine(ModelClaim):
     id = "ZENO-REFINE"
     expected = "supported"
-    summary = "With ever finer noise a bare threshold triggers ever more often; the trigger in use does not."
+    summary = "As the noise step shrinks, a bare threshold triggers more and more often; the trigger in use does not."
     statement = (
         "As the step of the decision noise is refined, the number of events of the bare threshold grows without bound, "
         "like one over the square root of the step; that of the trigger in use tends to a limit."
@@ -176,10 +176,9 @@ class ZenoRefine(ModelClaim):
         r"\frac{T}{\tau_{\min}} + 1",
     )
     method = (
-        f"{PATHS} Wiener paths with the task error held at the threshold, each at {HALVINGS + 1} noise steps that "
-        f"differ by a factor of {2**HALVINGS} in all; triggers counted exactly on the piecewise linear paths by the "
-        "running `Trigger`. Exponents by least squares with a term for the finite step, ln(mean) = c + p ln(dt) + "
-        "b sqrt(dt); "
+        f"The running `Trigger` counts triggers exactly on {PATHS} piecewise linear Wiener paths with the task error "
+        f"held at the threshold, at {HALVINGS + 1} noise steps over a factor of {2**HALVINGS}. Exponents are fitted by "
+        "least squares with a term for the finite step, ln(mean) = c + p ln(dt) + b sqrt(dt), with "
         "99 % intervals by bootstrap over the paths. Supported if the bare exponent's interval, widened by the known "
         "bias of the fit, contains -1/2 and is below -1/4, the automaton's contains 0 and is within 1/10 of it, and no "
         "path exceeds the bound. The bare counts must also be within 5 standard errors of their exact expectation."
@@ -188,11 +187,12 @@ class ZenoRefine(ModelClaim):
     assumptions = (
         "Noise is linear between its samples, as in the simulation.",
         "The task error stays at the threshold, where the noise decides. If the scenario's noise does not cross the "
-        "hysteresis within a dwell, louder noise that does is used; the bare count is the same at any intensity.",
+        "hysteresis within a dwell, a larger noise is used that does; the bare count is the same at any intensity.",
     )
     does_not_establish = (
-        "A proof of divergence or of the limit (ZENO-PROOF proves the bound for the automaton), or how many events a "
-        "run of the scenario has: its task error passes the threshold, it does not stay there (ZENO-TRACE counts them)."
+        "A proof of divergence or of the limit (ZENO-PROOF proves the bound for the automaton), or the number of "
+        "events in a run of the scenario, where the task error passes the threshold and does not stay there "
+        "(ZENO-TRACE counts them)."
     )
 
     kept = True

@@ -22,9 +22,9 @@ class ZenoTrace(TraceClaim):
     equations = "(20)"
     assumptions = ("The trace records every trigger (THR-TRIG recomputes them independently).",)
     does_not_establish = (
-        "Absence of Zeno behaviour in other runs: a finite run has finitely many events whatever the trigger is. The "
-        "statement for all runs is ZENO-PROOF, that about refined noise ZENO-REFINE. Without two triggers of a UGV "
-        "there is no gap: the claim holds with an empty margin."
+        "Absence of Zeno behaviour in other runs: a finite run has finitely many events whatever the trigger is. "
+        "ZENO-PROOF is the statement for all runs, and ZENO-REFINE is about refined noise. If no UGV has two triggers,"
+        " there is no gap, and the claim holds without a margin."
     )
 
     theorems = ("Trigger",)

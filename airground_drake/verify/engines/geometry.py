@@ -1,6 +1,6 @@
 """Exact geometry in continuous time of robots that move on straight lines between the rows of a trace.
 
-Boxes around blocks of rows bound distances from below, so that exact computations are needed for near pairs only.
+Boxes around blocks of rows give lower bounds of distances, so exact computations are needed for near pairs only.
 
 Times are in s, positions in m in one common frame; T is the number of rows. Row k ends segment k, which joins
 position[k-1] at t[k-1] to position[k] at t[k].
@@ -123,14 +123,14 @@ ROUNDING_M = 1e-9  # what a bound allows for rounding, m: distances up to 1e4 m 
 
 
 class Boxes(NamedTuple):
-    """Around K things on B blocks: corners (K, B, 3), m."""
+    """Bounding boxes of K bodies for B blocks: corners (K, B, 3), m."""
 
     low: Array
     high: Array
 
 
 def boxes_of(positions: Array) -> Boxes:
-    """Boxes around K things that are at places (K, T, 3), m, at the rows and on straight lines between them."""
+    """Bounding boxes of K bodies with positions (K, T, 3), m, at the rows and straight lines between them."""
     starts = np.arange(0, max(positions.shape[1] - 1, 1), ROWS)
     ends = positions[:, np.append(starts[1:], positions.shape[1] - 1)]  # the row at which the next block begins
     low, high = (side.reduceat(positions, starts, axis=1) for side in (np.minimum, np.maximum))
@@ -138,7 +138,7 @@ def boxes_of(positions: Array) -> Boxes:
 
 
 def apart_at_least(boxes: Boxes, first: Indices, second: Indices) -> Array:
-    """Bounds from below of the distances of P pairs of things, given by their numbers (P,): (P,), m."""
+    """Lower bounds of the distances of P pairs of bodies, given by their indices (P,): (P,), m."""
     least = np.empty(len(first))
     for some in np.array_split(np.arange(len(first)), len(first) * boxes.low.shape[1] // AT_ONCE + 1):
         these, those = first[some], second[some]

@@ -1,11 +1,11 @@
 """Signed distances from walls, polygons and prisms, in numpy for many places at once.
 
 A *core* is the convex hull of some corners in the plane, from one height to another: a point, a wall, a polygon or a
-prism. Inside a core a distance is minus the depth. The distance is a convex function of the place, and the normal of
-`Away` is a subgradient: the theorem of set-based avoidance asks for nothing else. Nothing of the running code is used.
+prism. Inside a core a distance is minus the depth. The distance is a convex function of position, and the normal of
+`Away` is a subgradient: the theorem of set-based avoidance needs nothing else. The controllers' code is not used.
 
 Leading dimensions (...) are broadcast: one core and many places, many cores and one place, or a core for each place.
-Places are (..., 3), m. `planar` says that a robot stays in its plane: then no way leads out of a core through its top.
+Places are (..., 3), m. `planar` says that a robot stays in its plane, so that it cannot leave a core through its top.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Cores:
         )
 
     def take(self, rows: Any) -> Cores:
-        """Some of the cores, as an array is indexed."""
+        """Selected cores, by an array index."""
         return Cores(self.corners[rows], self.base[rows], self.top[rows])
 
     @property
@@ -110,7 +110,7 @@ def unpacked(numbers: Sequence[float]) -> Array:
 
 
 class Away(NamedTuple):
-    """Signed distances, (...), m, and unit vectors away from the cores, (..., 3); 0 where no direction leads away."""
+    """Signed distances, (...), m, and unit vectors away from the cores, (..., 3); 0 where none exists."""
 
     distance: Array
     normal: Array
@@ -175,12 +175,12 @@ def away_from(cores: Cores, place: Array, *, planar: bool) -> Away:
 
 
 def _chosen(vectors: Array, k: Indices) -> Array:
-    """Of vectors (..., n, d) the k-th, (..., d)."""
+    """The k-th of vectors (..., n, d), (..., d)."""
     return np.take_along_axis(vectors, k[..., None, None], axis=-2)[..., 0, :]
 
 
 def least_distances(cores: Cores, start: Array, end: Array, *, planar: bool) -> tuple[Array, Array]:
-    """Least distances of cores from places in straight motion, (...), m, and the share of it where each is, exactly."""
+    """Exact least distances of cores from points in straight motion, (...), m, and the shares of the motion."""
     # The distance of a point in straight motion from a convex core is least at one of few places: at an end; where it
     # passes a corner or an edge at right angles; where it crosses the line of an edge or the plane of base or top. In a
     # polygon it is also where two edges are equally near. Each is a closed form, and the distance is evaluated there.
@@ -201,7 +201,7 @@ def least_distances(cores: Cores, start: Array, end: Array, *, planar: bool) -> 
 
 
 def _least(cores: Cores, start: Array, end: Array, shares: Array, planar: bool) -> tuple[Array, Array]:
-    """The least of the distances at some shares (..., C) of a straight motion, and the first of its shares."""
+    """The least distance at some shares (..., C) of a straight motion, and its first share."""
     shares = np.sort(np.clip(np.where(np.isfinite(shares), shares, 0.0), 0.0, 1.0), axis=-1)
     place = start[..., None, :] + shares[..., None] * (end - start)[..., None, :]
     many = Cores(cores.corners[..., None, :, :], cores.base[..., None], cores.top[..., None])
@@ -212,7 +212,7 @@ def _least(cores: Cores, start: Array, end: Array, shares: Array, planar: bool) 
 
 @np.errstate(divide="ignore", invalid="ignore")
 def _turning_points(cores: Cores, start: Array, end: Array, planar: bool) -> Array:
-    """Shares of a straight motion, (..., C); at one of them it is nearest to a core that it does not enter."""
+    """Candidate shares of a straight motion, (..., C), for the nearest point to a core that it does not enter."""
     step, edges = (end - start)[..., None, :], _edges(cores.corners)
     flat, to = step[..., :2], cores.corners - start[..., None, :2]
     crossed = (to * edges.outward).sum(axis=-1) / (flat * edges.outward).sum(axis=-1)
@@ -236,7 +236,7 @@ def _turning_points(cores: Cores, start: Array, end: Array, planar: bool) -> Arr
 
 @np.errstate(divide="ignore", invalid="ignore")
 def _equally_near(cores: Cores, start: Array, end: Array, planar: bool) -> Array:
-    """Shares of a straight motion at which two faces of a core are equally near, (..., C): it is deepest at one."""
+    """Candidate shares, (..., C), for the deepest point: where two faces of a core are equally near."""
     outward = _edges(cores.corners).outward
     first, last = (((place[..., None, :2] - cores.corners) * outward).sum(axis=-1) for place in (start, end))
     if not planar:
@@ -272,7 +272,7 @@ class Nearest(NamedTuple):
 
 
 def closest(cores: Cores, places: Array, *, planar: bool) -> Nearest:
-    """Where a way (T, 3), m, straight between its rows, is nearest to the nearest of m cores; the earliest place."""
+    """The (earliest) nearest point to any of m cores on a path (T, 3), m, straight between rows."""
     if len(places) == 1:
         return Nearest(float(away_from(cores, places, planar=planar).distance.min()), 0, 0.0)
     bounds = apart_by_blocks(cores, places)
@@ -305,7 +305,7 @@ def over_time(cores: Cores, places: Array, *, planar: bool) -> Array:
 
 
 class Contacts(NamedTuple):
-    """Places near cores, C of them by place and then core: their numbers, (C,), and how they are apart."""
+    """C pairs of a position and a near core, sorted by both: indices, (C,), and distances with directions."""
 
     place: Indices
     core: Indices

@@ -1,4 +1,4 @@
-"""By how much recorded positions miss the inequalities of set-based avoidance, in exact rational arithmetic.
+"""Violations of the avoidance inequalities by recorded positions, in exact rational arithmetic.
 
 The unit of time is the control period: the velocity of a body is the step to its next sample, and the gain is
 a = min(A h, 1). The second body is a point or a core: a wall, a polygon or a prism (`outlines.Cores`). Let D be the
@@ -38,7 +38,7 @@ POINT = Cores(np.zeros((1, 2)), np.array(0.0), np.array(0.0))  # the core of a b
 
 
 def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
-    """Rate at which two bodies have to part, or may approach at most: the law's inequality, here and nowhere else."""
+    """The law's inequality, defined only here: required rate of separation, or minus the allowed rate of approach."""
     # lacking: d - D, the missing distance: an array of doubles, or one rational number.
     return np.where(lacking >= 0, inside, outside) * lacking
 
@@ -47,7 +47,7 @@ def shortfalls(
     first: Array, second: Array, d: float, share: Fraction, gain: Fraction, last: Fraction,
     core: Cores = POINT, *, planar: bool = False, held: bool = False, seen: tuple[Array, Array] | None = None,
 ) -> Array:  # fmt: skip
-    """What a pair misses at each sample, e_1 + e_2, rounded up: (K,), m per control period."""
+    """A pair's violation at each sample, e_1 + e_2, rounded up: (K,), m per control period."""
     # With a body that may move with V, the first one alone keeps the passive law: share 1, gain 0, d + V h in place of
     # d, and the second held where it is at each sample. Then e is what the first one may lack of min(D, d + V h) by its
     # own doing.
@@ -66,7 +66,7 @@ def shortfalls(
 
 
 def shortage(place: Array, other: Array, d: float, core: Cores = POINT, *, planar: bool = False) -> Fraction:
-    """By how much a place (3,), m, is closer than d, m, to a core about another place, from above; 0 if it is not."""
+    """Upper bound of d minus the distance of a position, (3,), m, from a core; 0 if not positive."""
     (here, there), shape, unit = _in_units(np.stack([place, other]), core)
     return max(Fraction(d) - _apart(_ways_off(shape, _minus(here, there), planar, unit)), Fraction(0))
 
@@ -83,7 +83,7 @@ class _Pair(NamedTuple):
 
 
 def _doubtful(first: Array, other: Array, pair: _Pair, last: float, *, by_law: bool) -> Indices:
-    """Samples that floats find neither far nor, `by_law`, met by more than `SCREEN_M`: their numbers."""
+    """Indices of samples that need exact arithmetic: neither far nor, `by_law`, met by more than `SCREEN_M`."""
     distance, normal = away_from(pair.core, (first - other)[:-1], planar=pair.planar)
     normal[~normal.any(axis=1)] = np.nan
     d, share = float(pair.d), float(pair.share)
@@ -100,7 +100,7 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float, *, by_law: b
 
 
 def _shortfall(places: Array, pair: _Pair, lasts: Fraction) -> Fraction:
-    """e of one sample, from above, m."""
+    """Upper bound of e at one sample, m."""
     # places: of the first body at the sample and at the next, and of the second; and of both at the sample as measured,
     # if the law acted on these: (4, 3) or (6, 3), m. Then the pair meets the law together.
     (here, after, there, beyond, *seen), shape, unit = _in_units(places, pair.core)
@@ -130,7 +130,7 @@ def _shortfall(places: Array, pair: _Pair, lasts: Fraction) -> Fraction:
 
 
 class _Shape(NamedTuple):
-    """A core in units: its corners, each once, and the heights between which it stands."""
+    """A core in integer units: distinct corners, and the heights of base and top."""
 
     corners: list[list[int]]
     base: int
@@ -138,14 +138,14 @@ class _Shape(NamedTuple):
 
 
 class _Way(NamedTuple):
-    """A direction in which the distance grows, not of length 1, and a lower bound of the distance, m, along it."""
+    """A direction (not normalised) of increasing distance, and a lower bound of the distance, m, along it."""
 
     normal: Sequence[int]
     apart: Fraction
 
 
 def _ways_off(shape: _Shape, place: Sequence[int], planar: bool, unit: int) -> list[_Way]:
-    """The direction away from a core, or out of it: there the nearest faces to within `TIE_M`; none on a point."""
+    """The directions away from a core, or out of it by the nearest faces (ties within `TIE_M`); none on a point."""
     # On a wall both sides will do.
     x, y, z = place
     corners, count = shape.corners, len(shape.corners)

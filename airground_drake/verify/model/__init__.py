@@ -1,1 +1,1 @@
-"""What claims about the model share: a theorem and its hypotheses (`theorem.py`), the trigger (`levels.py`)."""
+"""Code shared by claims about the model: theorems with hypotheses (`theorem.py`), trigger levels (`levels.py`)."""

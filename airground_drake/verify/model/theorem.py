@@ -1,4 +1,4 @@
-"""A claim about the model that is a theorem: Coq checked it once, and its hypotheses are checked for each scenario."""
+"""Claims that are theorems: checked once by Coq; their hypotheses are checked for each scenario."""
 
 import abc
 from collections.abc import Sequence
@@ -65,7 +65,7 @@ class TheoremClaim(ModelClaim):
         return {}
 
     def with_runs(self, finding: Finding, seen: Sequence[tuple[int, int]]) -> Finding:
-        """Add how often the runs met the premise, of how many times: a theorem that never applies protects nothing."""
+        """Add how often the runs met the premise: a theorem that never applies protects nothing."""
         if not seen or not is_proof(finding.evidence):
             return finding
         met, cases = (sum(column) for column in zip(*seen, strict=True))

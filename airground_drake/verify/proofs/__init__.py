@@ -1,4 +1,4 @@
-"""General theorems, proved once and checked by Coq (`coq/*.v`); what they need is checked in every report."""
+"""General theorems, checked once by Coq (`coq/*.v`); every report checks their hypotheses."""
 
 from airground_drake.verify.proofs.record import Standing, standing
 from airground_drake.verify.proofs.theorems import THEOREMS, Theorem

@@ -1,7 +1,7 @@
 """A recorded run as Coq files: its positions as integers, and theorems about them that Coq decides by computing.
 
-A first-order robot moves on the straight lines between its recorded places. For others the theorems of Plants.v bound
-what leaves these lines, from the numbers of their plants:
+A first-order robot moves on the straight lines between its recorded places. For other plants, theorems of Plants.v
+bound the deviation from these lines:
 
 - the axle of a unicycle runs on arcs, off their chords by |omega| |v| h^2 / 8 at most;
 - a body with lag tau accelerates by 2 V / tau at most, and is off by V h^2 / (4 tau);
@@ -41,7 +41,7 @@ Place = tuple[Fraction, Fraction, Fraction]
 
 
 class ConvexSet(NamedTuple):
-    """All between two heights that is over a convex outline, m from where its body is."""
+    """A prism over a convex outline between two heights, m, relative to its body's position."""
 
     outline: tuple[tuple[Fraction, Fraction], ...]  # corners, counter-clockwise; two of a wall, one of a post
     base: Fraction = Fraction(0)  # lowest z
@@ -54,7 +54,7 @@ class ConvexSet(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """Two bodies, by name, and the distance that they are to keep."""
+    """Two bodies, by name, and the distance that they must keep."""
 
     first: str  # a robot
     second: str  # the other body
@@ -77,7 +77,7 @@ class Demand(NamedTuple):
 
     @property
     def safe_m(self) -> Fraction:
-        """Distance of the recorded straight lines, m, with room for what bodies are off them."""
+        """Required distance of the recorded straight lines, m, including the deviation of bodies."""
         return self.body_m + self.room_m
 
     @property
@@ -118,7 +118,7 @@ class Recorded:
 
     @cached_property
     def rows(self) -> Mapping[str, Sequence[Vector]]:
-        """Where each body is at each row, in whole numbers of metres / unit."""
+        """Positions of each body at each row, in integer units."""
         unit, count = self.unit, len(self.times)
         whole = {
             name: [(int(x * unit), int(y * unit), int(z * unit)) for x, y, z in places]
@@ -127,7 +127,7 @@ class Recorded:
         return {name: rows * count if len(rows) == 1 else rows for name, rows in whole.items()}
 
     def way(self, demand: Demand) -> list[Vector]:
-        """Where the first body of a pair is at each row as seen from the second one, in metres / unit."""
+        """Positions of the first body of a pair relative to the second, in units."""
         both = zip(self.rows[demand.first], self.rows[demand.second], strict=True)
         return [(p[0] - q[0], p[1] - q[1], p[2] - q[2]) for p, q in both]
 
@@ -137,7 +137,7 @@ class Recorded:
 
 
 def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
-    """A run with its positions rounded to 1/PARTS m; nothing else is rounded."""
+    """A run with positions rounded to 1/PARTS m, and all else exact."""
     # steered: whether it is the record of the points that the law steers, in place of the bodies.
     refuse_unknown(trace)
     scenario, control = trace.scenario, trace.scenario.control
@@ -176,7 +176,7 @@ COVERED = frozenset(
 
 
 def refuse_unknown(trace: Trace) -> None:
-    """Refuse a run with a body that no theorem is about."""
+    """Refuse a run with a body that no theorem covers."""
     for name, body in trace.scenario.bodies.items():
         for key in fields(body):
             given, default = getattr(body, key.name), key.default
@@ -196,13 +196,13 @@ def _sets(obstacle: Obstacle, core: str) -> tuple[ConvexSet, ...]:
 
 
 def off_m(trace: Trace, *, steered: bool = False) -> dict[str, Fraction]:
-    """How far the bodies of robots may be off the straight lines between recorded places, m, if they may be."""
+    """Largest deviations of robots' bodies from the straight lines between recorded positions, m, if not 0."""
     of = off_steered_m if steered else off_lines_m
     return {name: of(trace, name) for name in trace.robots if trace.is_apart(name)}
 
 
 def demands_of(trace: Trace, *, steered: bool = False) -> list[Demand]:
-    """The demands on a run, with room for what its bodies may be off, or for what the law adds."""
+    """The demands on a run, including deviations of bodies, or the law's additional distance."""
     lines = off_m(trace)
     demanded = []
     for demand in demands(trace.scenario):
@@ -217,7 +217,7 @@ def demands_of(trace: Trace, *, steered: bool = False) -> list[Demand]:
 
 
 def demands(scenario: Scenario) -> list[Demand]:
-    """Who is to keep which distance from whom: each robot from each obstacle, and each two robots."""
+    """The required distances: each robot from each obstacle, and each two robots."""
     balls = {name for name, obstacle in scenario.barriers.items() if convex_parts(obstacle) is None}
     demanded = []
     for pair in apart(scenario):
@@ -238,7 +238,7 @@ def _round(axis: float) -> Fraction:
 
 
 def _spelled(names: list[str]) -> dict[str, str]:
-    """Names for Coq: as they are if that is a free identifier, else by number."""
+    """Names for Coq: unchanged if that is an unused identifier, otherwise numbered."""
     plain = re.compile(r"(?!run_|body_number_|entry_)(?!\w*(_and_|_(places|ground|solid)\b))[A-Za-z]\w*", re.ASCII)
     return {
         name: name if plain.fullmatch(name) and name not in _taken() else f"body_number_{k}"
@@ -248,7 +248,7 @@ def _spelled(names: list[str]) -> dict[str, str]:
 
 @cache
 def _taken() -> frozenset[str]:
-    """Words that mean something in the theories or in an exported file."""
+    """Identifiers used in the theories or in an exported file."""
     theories = "".join(file.read_text(encoding="utf-8") for file in sorted(FOLDER.glob("*.v")))
     words = re.findall(r"\w+", without_comments(theories))
     own = {*re.findall(r"\w+", _DISTANCES), "is_well_formed", "decide_entry"}
@@ -280,7 +280,7 @@ Ltac decide_clear a b vectors :=
 
 
 def distances_file(run: Recorded, *, vectors: bool = True) -> str:
-    """The run, and the theorem that every pair keeps its distance at all times; Coq needs the `vectors`."""
+    """The file with the run and the theorem that all pairs keep their distances; Coq needs the `vectors`."""
     interval = f"{real(run.times[0])} <= t <= {real(run.times[-1])}"
     claims = [_claim(run, demand) for demand in run.demands]
     lemmas = ""
@@ -309,7 +309,7 @@ def distances_file(run: Recorded, *, vectors: bool = True) -> str:
 
 
 def offs(run: Recorded) -> str:
-    """How far bodies may be off the straight lines, by their numbers."""
+    """Definition of the bodies' deviations from the straight lines, by their numbers."""
     listed = "; ".join(real(run.off_m.get(name, Fraction(0))) for name in run.places)
     value = f"nth i [{listed}] 0" if run.off_m else "0"
     return (
@@ -340,7 +340,7 @@ Ltac decide_bodies i j keeps :=
 
 
 def _bodies(run: Recorded, interval: str) -> str:
-    """The theorem that the bodies keep their distances, wherever they are near the straight lines."""
+    """The theorem that bodies within their deviation of the straight lines keep their distances."""
     claims = [_body_claim(run, demand) for demand in run.demands]
     lemmas = "".join(
         f"Lemma bodies_{demand.lemma} : forall t, {interval} ->\n  {claim}.\n"
@@ -377,7 +377,7 @@ def _vectors(run: Recorded, demand: Demand) -> str:
 
 
 def without_vectors(text: str) -> str:
-    """An exported file without its separating vectors: others, found on another machine, may prove the same."""
+    """An exported file without its separating vectors, which may differ between machines."""
     return re.sub(r"^Definition \w+_vectors := \(\[[][\s();,P\da-fx-]*\]\)%Z\.\n", "", text, flags=re.MULTILINE)
 
 
@@ -399,7 +399,7 @@ def all_of(proofs: Sequence[str]) -> str:
 
 
 def data(run: Recorded) -> str:
-    """The integers: bodies, their numbers, convex sets, times; and that they make a run."""
+    """The definitions: bodies, their numbers, convex sets, times; and the lemma that they make a run."""
     unit = run.unit
     out = [f"(** Positions at the rows, in parts: {unit} parts are 1 m. *)\n"]
     for name, rows in run.rows.items():
@@ -444,27 +444,27 @@ def ratio(number: Fraction) -> str:
 
 
 def _bounds(trace: Trace, robot: str) -> Bounds:
-    """How far a robot's body may be from the point that the law steers, at its limit or fastest command, if faster."""
+    """Bounds of a robot's body, at its speed limit or at its fastest command if that is faster."""
     fastest = float(np.linalg.norm(trace.chosen(robot), axis=1).max())
     return trace.plant(robot).bounds(max(trace.scenario.robots[robot].max_speed_m_s, fastest))
 
 
 def off_lines_m(trace: Trace, robot: str) -> Fraction:
-    """How far a robot's body may be off the straight lines between its recorded places, m."""
+    """Largest deviation of a robot's body from the straight lines between its recorded positions, m."""
     limits = _bounds(trace, robot)
     lagging = limits.speed_m_s * trace.scenario.control.period_s**2 / (4.0 * limits.lag_s) if limits.lag_s else 0.0
     return Fraction(limits.dip_m) + Fraction(lagging)
 
 
 def off_steered_m(trace: Trace, robot: str) -> Fraction:
-    """How far a robot's body may be off the straight lines of the point that the law steers, m."""
+    """Largest deviation of a robot's body from the straight lines of its steered point, m."""
     limits = _bounds(trace, robot)
     room = Fraction(limits.cover_m) + Fraction(limits.dip_m)
     return max(room - ROUNDED_M, Fraction(0))
 
 
 def law_m(trace: Trace, distance_m: Fraction, first: str, second: str) -> Fraction:
-    """The distance that the law keeps between two steered points, or one and a set at rest, m."""
+    """The law's distance between two steered points, or between one and a static set, m."""
     robots, control = trace.scenario.robots, trace.scenario.control
     both = [
         bounds_of(robots[name], control.period_s, trace.scenario.seen(name))

@@ -1,8 +1,8 @@
 """Reads an exported Coq file back and compares it with the run.
 
 Coq cannot see whether the numbers in the file are the recorded ones. This module takes the file apart by its own
-patterns. From the exporter it uses only `demands`: who keeps which distance from whom. Corners are compared with the
-shapes of the scenario.
+patterns. From the exporter it uses only `demands`, the required distances. Corners are compared with the shapes of the
+scenario.
 """
 
 import re
@@ -28,7 +28,7 @@ class ReadbackError(AirgroundError):
 
 
 class RereadError(NamedTuple):
-    """How many coordinates differ from the recorded ones, and by how much at most, m."""
+    """The number of coordinates that differ from the recorded ones, and the largest difference, m."""
 
     coordinates: int
     most_m: float
@@ -56,7 +56,7 @@ def compare(text: str, trace: Trace) -> RereadError:
 
 
 def compare_positions(text: str, trace: Trace, *, steered: bool = False) -> tuple[dict[str, str], RereadError]:
-    """The names of bodies in the file, by their names in the trace, and by how much coordinates differ."""
+    """The names of bodies in the file, by their names in the trace, and the differences of coordinates."""
     run = f"run_{trace.run}{'_steered' if steered else ''}"
     unit, times, listed = _parts(rf"^Definition {run} := Run (\w+) \[\n(.*?)\] \[\n(.*?)\]\.$", text)
     if [Fraction(int(t, 0), int(unit, 0)) for t in times.split(";\n")] != [Fraction(t) for t in trace.t.tolist()]:
@@ -105,7 +105,7 @@ def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> lis
 
 
 def _off_corners(sets: str, text: str, unit: int, parts: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
-    """By how much the corners of convex sets in the file differ from those of the scenario, m."""
+    """Differences of the corners of convex sets between the file and the scenario, m."""
     [what] = _parts(rf"^Definition {sets} := \[\n(.*?)\]\.$", text)
     said = [_points(part, unit) for part in what.split(";\n")]
     if [len(part) for part in said] != [len(part) for part in parts]:
@@ -121,7 +121,7 @@ def _points(text: str, unit: int) -> list[list[Fraction]]:
 
 
 def _compare_theorem(theorem: str, text: str, trace: Trace, kinds: Sequence[str], wanted: Sequence[Claim]) -> None:
-    """The theorem is about all of the run's time and every pair, with its full distance."""
+    """Check that the theorem is about the whole run and every pair, with its full distance."""
     # kinds: patterns of claims, each with the groups `first`, `second` and `safe`, and `sets` where there are any.
     start, end, body = _parts(rf"^Theorem {theorem} : forall t, {_NUMBER} <= t <= {_NUMBER} ->\n(.*?)\.\nProof\.", text)
     if [_value(start), _value(end)] != [Fraction(trace.t[0]), Fraction(trace.t[-1])]:

@@ -1,4 +1,4 @@
-"""The record of the last check by Coq, and whether the theories are still those that were checked."""
+"""The record of the last check by Coq, and whether the theories are unchanged since then."""
 
 import json
 import re
@@ -62,7 +62,7 @@ def read_record(folder: Path = FOLDER) -> dict[str, Any] | None:
 
 
 def _doubt(record: Mapping[str, Any], names: tuple[str, ...], theory: Mapping[str, str]) -> str:
-    """Why the theorems are not covered by the record; empty if they are."""
+    """The reason why the record does not cover the theorems; empty if it does."""
     for file, sha256 in theory.items():
         if record["sha256"].get(file) != sha256:
             return f"{file} differs from its record: run `airground prove`"

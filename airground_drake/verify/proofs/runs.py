@@ -1,4 +1,4 @@
-"""The runs of a report as theorems: a Coq file each, which Coq decides; without it files are compared with traces."""
+"""The runs of a report as theorems: Coq decides a file for each; without Coq the files are compared with traces."""
 
 import json
 import time
@@ -101,7 +101,7 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
 
 
 def _law(run: Trace, exact: Recorded, *, proved: bool) -> tuple[Recorded, list[Entry], str]:
-    """The record of the points that the law steers, its table, and the file about it; '' without an entry."""
+    """The record of the steered points, its table, and the file about it; '' without an entry."""
     # proved: whether Coq accepts the file about distances: then the file about the law may take positions from there.
     lawfully = recorded(run, steered=True) if exact.off_m else exact
     table = entries(lawfully)
@@ -109,7 +109,7 @@ def _law(run: Trace, exact: Recorded, *, proved: bool) -> tuple[Recorded, list[E
 
 
 def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: str, limit_s: float) -> CoqReply:
-    """Have Coq prove the table of a run, from its file; it is wanted of all pairs and periods."""
+    """Have Coq prove the table of a run from its file; complete if it covers all pairs and periods."""
     theorem = f"{run.name}_obeys_the_law"
     name = f"{run.name}_law.v"
     gaps = missed(run, table)
@@ -128,7 +128,7 @@ def _decide_law(place: Workshop, run: Recorded, table: Sequence[Entry], text: st
 
 @contextmanager
 def _usable(run: Trace) -> Iterator[None]:
-    """Refuse a scenario that was damaged in meta.json."""
+    """Refuse a damaged scenario in meta.json."""
     try:
         yield
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -152,7 +152,7 @@ def _pair(demand: Demand) -> str:
 
 
 def _about(run: Recorded, text: str, line: int) -> Demand | None:
-    """The pair whose lemma is at a line of an exported file."""
+    """The pair of the lemma at a line of an exported file."""
     before = "\n".join(text.splitlines()[:line])
     lemma = before.rpartition("\nLemma ")[2].partition(" ")[0]
     return next((demand for demand in run.demands if demand.lemma == lemma), None)
@@ -186,7 +186,7 @@ def prove_report(report: Path, names: Sequence[str] = (), limit_s: float = coq.L
 
 
 def _about_run(report: Path, run: Trace, rounded: readback.RereadError) -> dict[str, Any]:
-    """What proofs.json says of a run of a report besides Coq's answers."""
+    """The entries of proofs.json about a run besides Coq's answers."""
     asked = demands_of(run)
     return {
         "expected": expects_kept(run),
@@ -200,7 +200,7 @@ def _about_run(report: Path, run: Trace, rounded: readback.RereadError) -> dict[
 
 
 def expects_kept(run: Trace) -> bool:
-    """Whether the scenario expects that the run keeps its distances: the claim is promised, and not to be refuted."""
+    """Whether the scenario expects that the run keeps its distances."""
     expected = run.scenario.runs[run.run].expected.get(DISTANCES, "holds")
     return declared(expected) != NOTHING and "refuted" not in expected
 
@@ -234,7 +234,7 @@ def _entry(answer: CoqReply) -> dict[str, Any]:
 
 
 def listed(gaps: Iterable[Missed]) -> list[dict[str, Any]]:
-    """Pairs with periods that no entry is about, as strict JSON."""
+    """Pairs with periods without an entry, as strict JSON."""
     return [
         {"first": gap.demand.called[0], "second": gap.demand.called[1], "begin_s": gap.begin_s, "end_s": gap.end_s}
         for gap in gaps

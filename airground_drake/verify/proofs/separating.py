@@ -1,4 +1,4 @@
-"""Vectors that separate a point on its way from a convex set, in whole numbers: proofs for DistanceChecker.v."""
+"""Integer vectors that separate a moving point from a convex set: proofs for DistanceChecker.v."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TRIES = 8  # how often a longer stretch is looked for
 
 
 class Prism(NamedTuple):
-    """A convex set: all between two heights that is over a convex outline. In parts of a metre."""
+    """A prism over a convex outline between two heights, in parts of a metre."""
 
     outline: tuple[tuple[int, int], ...]  # its corners, counter-clockwise; two of a wall, one of a post
     base: int = 0  # lowest z
@@ -33,7 +33,7 @@ class Prism(NamedTuple):
 
     @property
     def corners(self) -> list[Vector]:
-        """The set is the convex hull of them."""
+        """The corners of the convex hull."""
         return [(x, y, z) for z in self.levels for x, y in self.outline]
 
     @property
@@ -46,12 +46,12 @@ class Prism(NamedTuple):
 
     @property
     def normals(self) -> list[Vector]:
-        """Of its faces, outwards, and of its outline."""
+        """Outward normals of its faces and of its outline."""
         sides = [_reduced((y, -x, 0)) for _, (x, y, _) in self.edges if x or y]
         return [*dict.fromkeys(sides), (0, 0, 1), (0, 0, -1)]
 
     def nearest(self, points: Array) -> Array:
-        """The points of the set that are nearest to others, in floating point; both (k, 3)."""
+        """The nearest points of the set to given points, in floating point; both (k, 3)."""
         outline = np.array(self.outline, dtype=np.float64)
         nearest = points.copy()
         best = np.full(len(points), np.inf)
@@ -70,7 +70,7 @@ class Prism(NamedTuple):
 
 
 def separating(prisms: Sequence[Prism], way: Sequence[Vector], safe: int) -> list[list[Stretch]]:
-    """Vectors that show that a point keeps a distance on its way, each for as many periods as one is found to serve."""
+    """Vectors that prove a point's distance on its path, each for as many periods as possible."""
     # way: places of the point at the rows, two or more; straight in between. Parts.
     # Returns for each set stretches that make up the way. If the distance is not kept, the last one serves the rest of
     # it, and is wrong.
@@ -94,7 +94,7 @@ def _stretches(prism: Prism, way: Sequence[Vector], search: _Search) -> list[Str
 
 
 class _Search:
-    """The rows of a way that a vector serves."""
+    """Search for the periods of a path that a vector covers."""
 
     def __init__(self, prism: Prism, way: Sequence[Vector], rows: Array, safe: int) -> None:
         self._corners = prism.corners
@@ -108,7 +108,7 @@ class _Search:
         self._doubt = 1e-12 * max(np.abs(self._rows).max(), np.abs(np.array(self._corners, dtype=float)).max(), safe)
 
     def longest(self, row: int) -> tuple[int, Vector]:
-        """The last row of the longest stretch found that begins at a row, and its vector."""
+        """The last row of the longest covered stretch from a row, and its vector."""
         last = len(self._way) - 1
         nearest = row + int(np.argmin(self._apart[row:]))
         best, before = (row, (0, 0, 0)), -1
@@ -127,7 +127,7 @@ class _Search:
         return best
 
     def end(self, vector: Vector, row: int) -> int:
-        """The last row of the periods from a row on that a vector serves; the row itself if it serves none."""
+        """The last row of the consecutive periods from a row that a vector covers; the row itself if none."""
         if not any(vector):
             return row
         along = max(dot(vector, corner) for corner in self._corners)
@@ -141,7 +141,7 @@ class _Search:
         return len(self._way) - 1
 
     def _rounded(self, directions: Array) -> Iterator[Vector]:
-        """Directions (k, 3) in whole numbers, short ones first."""
+        """Directions (k, 3) as integer vectors, short ones first."""
         for length in SCALES:
             for x, y, z in np.rint(directions * length).astype(int).tolist():
                 yield _reduced((x, y, z))
@@ -160,7 +160,7 @@ def apart(prism: Prism, begin: Vector, end: Vector) -> tuple[Fraction, Vector]:
 
 
 def _directions(prism: Prism, begin: Vector, end: Vector) -> Iterator[Vector]:
-    """The direction of the distance is among them: of a corner, edge or face from an end of the way or all of it."""
+    """Candidate directions of the least distance: from corners, edges or faces to an end of the path, or all of it."""
     way = _minus(end, begin)
     for corner in prism.corners:
         to = _minus(begin, corner)

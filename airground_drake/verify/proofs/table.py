@@ -32,7 +32,7 @@ class Entry(NamedTuple):
 
 
 class Missed(NamedTuple):
-    """A pair with periods that no entry is about."""
+    """A pair with periods without an entry."""
 
     demand: Demand  # the pair
     begin_s: float  # when the first of these periods begins, s
@@ -40,7 +40,7 @@ class Missed(NamedTuple):
 
 
 def lawful(demands: Iterable[Demand]) -> list[Demand]:
-    """The pairs that have entries: two balls that do not move by themselves, without a lag or delay."""
+    """The pairs with entries: of two robots or a robot and a static ball, without a lag or delay."""
     return [demand for demand in demands if not (demand.core or demand.passive or demand.late)]
 
 
@@ -100,7 +100,7 @@ Ltac decide_entry i j num den x y :=
 
 
 def law_file(run: Recorded, table: Sequence[Entry], *, alone: bool = False) -> str:
-    """The theorem that the entries of a table were checked, and that they keep their promises."""
+    """The file with the theorem that the table's entries were checked and keep their promises."""
     # alone: whether the file has the positions itself, in place of those in the file about distances.
     robots = dict.fromkeys(entry.demand.first for entry in table)
     groups = [[entry for entry in table if entry.demand.first == robot] for robot in robots]
@@ -201,6 +201,6 @@ def _near(prism: Prism, rows: Array, reach: float) -> list[int]:
 
 
 def _when(prism: Prism, begin: Vector, end: Vector) -> Fraction:
-    """Where on the way from one place to another a set is nearest, from 0 to 1; to a hundredth."""
+    """The share of a straight motion, from 0 to 1, at which a set is nearest, to 0.01."""
     places = np.linspace(np.array(begin, dtype=np.float64), np.array(end, dtype=np.float64), 101)
     return Fraction(int(np.argmin(np.linalg.norm(places - prism.nearest(places), axis=1))), 100)

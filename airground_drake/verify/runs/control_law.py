@@ -1,6 +1,6 @@
-"""The avoidance inequalities (7)-(8), (11), written again in numpy for all samples of a run at once.
+"""The avoidance inequalities (7)-(8), (11), written independently in numpy for all samples of a run at once.
 
-Velocities in m/s, positions in m, world frame. Nothing of the running code is used.
+Velocities in m/s, positions in m, world frame. The controllers' code is not used.
 """
 
 from typing import NamedTuple
@@ -55,9 +55,9 @@ def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Arr
 def _towards_unsure(
     normal: Array, bound: Array, distance: Array, excess: Array, unsure: Array, period_s: float, *, planar: bool
 ) -> tuple[Indices, Array, Array]:
-    """Those towards places that are not sure take their form: which inequalities they come from, normals, bounds."""
-    # Nearer than allowed to such a place the velocity stays in a cone, between two lines in the plane; without a way
-    # that surely leads off nothing is allowed, which two inequalities say that contradict each other.
+    """The inequalities, with those for uncertain places in their own form: origins, normals, bounds."""
+    # Too near to such a place the velocity stays in a cone, between two lines in the plane. If no direction is sure to
+    # lead away nothing is allowed: the two inequalities contradict each other.
     k = np.arange(len(bound))
     bound = np.where(unsure > 0.0, -excess / period_s, bound)
     cone = (unsure > 0.0) & (excess < 0.0)
@@ -73,7 +73,7 @@ def _towards_unsure(
 
 
 def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
-    """The inequalities of a robot at the control samples of its run, beside all that is within sensing range."""
+    """The inequalities of a robot at the control samples of its run, for all bodies within sensing range."""
     samples = trace.sample_rows
     parts = parts_of(trace)
     control = trace.scenario.control

@@ -1,7 +1,7 @@
-"""The parameters that the controllers of a run must be built with: who keeps what distance from whom, which share.
+"""The parameters that the controllers of a run must have, such as distances and shares.
 
-They are read off the scenario and compared with those that were read back from the controllers in the diagram. Nothing
-is taken from the code that builds them, so that a wrong distance there is a difference here.
+They are read from the scenario and compared with the parameters read back from the controllers in the diagram. The code
+that builds the controllers is not used, so that a wrong distance there is a difference here.
 """
 
 from collections.abc import Iterator, Sequence
@@ -109,7 +109,7 @@ def outlines_of(trace: Trace) -> Iterator[Array]:
 
 
 def _without_circles(numbers: Sequence[float]) -> Array:
-    """The numbers of outlines, but for the circles round their corners; NaN in place of a circle that is too small."""
+    """The numbers of outlines without the circles round their corners; NaN if a circle is too small."""
     try:
         rows = unpacked(numbers)
     except ValueError:
@@ -123,7 +123,7 @@ def _without_circles(numbers: Sequence[float]) -> Array:
 
 
 def differences(trace: Trace) -> Iterator[dict[str, Any]]:
-    """Parameters of the controllers that are not what the scenario demands, each with the first place that differs."""
+    """Parameters of the controllers that differ from the scenario, each with the first difference."""
     built = trace.meta["controllers"]
     for controller, wanted in demanded(trace).items():
         for parameter, due in wanted.items():
@@ -146,7 +146,7 @@ def differences(trace: Trace) -> Iterator[dict[str, Any]]:
 
 
 def _place(trace: Trace, wanted: dict[str, Any], parameter: str, k: int) -> dict[str, Any]:
-    """Which robot, and beside what, the k-th number of a parameter is about."""
+    """The robot and the other body of the k-th number of a parameter."""
     members, parts = wanted["members"], parts_of(trace)
     length = len(wanted[parameter]) // len(members)
     if parameter in ("safe_m", "share"):

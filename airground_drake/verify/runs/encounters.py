@@ -1,8 +1,8 @@
-"""Whose doing it was that two bodies came nearer than required.
+"""The cause of each approach closer than required.
 
-The other body is held where it was at each control sample; what a robot's body then takes of the distance, its own
-motion took. The law promises less of a body that is not where the law steers it: what lags, delays and hand points
-cover. What a body takes within that, commands already under way took.
+The other body is held at its position of the control sample: then any loss of distance is due to the robot's own
+motion. For a body off its steered point the law promises less, by the cover of lags, delays and hand points. A loss
+within this cover is due to earlier commands.
 """
 
 from math import ceil
@@ -46,14 +46,14 @@ def samples_before(trace: Trace) -> Indices:
 
 @per_trace
 def steps_of(trace: Trace, robot: str) -> Array:
-    """How far from its place at the control sample a robot's body gets in each segment between rows, (T - 1,), m."""
+    """Largest distance of a robot's body from its position at the control sample, by segment, (T - 1,), m."""
     place, sample = trace.body(robot), trace.body(robot)[samples_before(trace)]
     begun, ended = (np.linalg.norm(at - sample, axis=1) for at in (place[:-1], place[1:]))
     return np.asarray(np.maximum(begun, ended) + off_m_of(trace, robot))
 
 
 class OwnMargins(NamedTuple):
-    """What a robot left of a distance by its own doing, in the T - 1 segments between rows, (T - 1,), m."""
+    """A robot's margins to a required distance by its own motion, in the segments between rows, (T - 1,), m."""
 
     # inf: the two were too far apart for one period to matter, or not both there.
 
@@ -73,7 +73,7 @@ class OwnMargins(NamedTuple):
 
 
 def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
-    """What a robot left of the distance of a pair by its own doing: the other body is held as at the control sample."""
+    """A robot's margins by its own motion, with the other body held at its position of the control sample."""
     other = pair.second if robot == pair.first else pair.first
     rows = np.arange(len(trace.t) - 1)
     sample = samples_before(trace)
@@ -113,7 +113,7 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
 
 
 def _first_apart(pair: Pair, gaps: Array) -> int:
-    """The first row at which a pair that is there has its distance; without one, the number of rows."""
+    """The first row at which an existing pair has its distance; without one, the number of rows."""
     apart = np.flatnonzero(gaps[pair.row :] >= pair.required_m - DISTANCE_TOLERANCE_M)
     return pair.row + int(apart[0]) if len(apart) else len(gaps)
 
@@ -151,7 +151,7 @@ class Encounter(NamedTuple):
     caught_s: tuple[float, ...] = ()  # from when to when they did, without a pause; () if never
 
     def told(self, trace: Trace) -> str:
-        """Whose doing it was, in a sentence without a full stop."""
+        """The cause, as a sentence without a full stop."""
         if self.doing == "under way":
             drove = f"{self.first} drove {self.under_way_m:.2f} m on by commands under way"
             return f"{drove}, to {self.gap_m:.2f} m from {self.second}"
@@ -212,7 +212,7 @@ def _whose_doing(trace: Trace, least: Gap) -> str:
 
 
 def _steered_nearer(trace: Trace, pair: Pair, robot: str) -> bool:
-    """Whether commands led the steered point of a robot nearer than the law keeps: the body only follows, later."""
+    """Whether commands led a robot's steered point closer than the law allows (the body follows later)."""
     rows = trace.sample_rows[(trace.sample_rows >= pair.row) & (trace.sample_rows <= pair.last)]
     other = pair.second if robot == pair.first else pair.first
     origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
@@ -226,7 +226,7 @@ def _steered_nearer(trace: Trace, pair: Pair, robot: str) -> bool:
 
 
 def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:
-    """Way of the body of the robot of a pair, from the last row at which the gap was kept up to a time, m."""
+    """Path length of a pair's robot body since the last row with the required gap, up to a time, m."""
     end = min(int(np.searchsorted(trace.t, t_s)), len(trace.t) - 1)
     apart = np.flatnonzero(gaps[pair.row : end] >= pair.required_m - DISTANCE_TOLERANCE_M)
     begin = pair.row + (int(apart[-1]) if len(apart) else 0)
@@ -234,7 +234,7 @@ def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:
 
 
 def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) -> Encounter:
-    """An encounter, with what the robot did beside an obstacle that may move, and what kept it from more."""
+    """An encounter with the robot's reaction to an obstacle that may move, and what limited it."""
     periods, t_s = periods_of(trace, pair), encounter.t_s
     before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
     k = int(before[-1])
@@ -262,7 +262,7 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) 
 
 
 def _reaction(speed: float, away: float, limit: float) -> str:
-    """What a robot did, from its speed, how fast that led away from the obstacle, and its limit, m/s."""
+    """A robot's reaction in words, from its speed, its speed away from the obstacle, and its limit, m/s."""
     if speed <= STANDING_M_S:
         return "stood"
     if away <= STANDING_M_S:
@@ -271,7 +271,7 @@ def _reaction(speed: float, away: float, limit: float) -> str:
 
 
 def _blocked_by(trace: Trace, pair: Pair, periods: Periods, k: int, given: Inequalities, sample: int) -> list[str]:
-    """The bodies whose inequalities forbid the straight retreat that a robot should make in a period."""
+    """The bodies whose inequalities forbid a robot's straight retreat in a period."""
     h = trace.scenario.control.period_s
     limit = trace.scenario.robots[pair.first].max_speed_m_s
     wished = min(pair.speed_m_s - (float(periods.apart_m[k]) - pair.law_m) / h, limit)

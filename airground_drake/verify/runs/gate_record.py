@@ -1,6 +1,6 @@
-"""Recorded gatekeeper decisions, and what the claims about them share.
+"""Recorded gatekeeper decisions, and code shared by claims about them.
 
-The paper's formulas are written again in plain numpy; N is the number of stages, m of the points to keep away from.
+The paper's formulas are written independently in numpy; N is the number of stages, m of the points to avoid.
 """
 
 import abc
@@ -53,7 +53,7 @@ class DecisionRecord:
         return int(self.given["number"])
 
     def __getitem__(self, name: str) -> Array:
-        """An array that must be there."""
+        """A required array."""
         array = self.data[name]
         if array is None:
             raise TraceError(f"{self.label}: the problem has no {name!r}")
@@ -111,7 +111,7 @@ class DecisionRecord:
 
     @cached_property
     def lasting(self) -> Array:
-        """Weight of the task error at the end of each stage, (N,), s: its length, and w more at the last one."""
+        """Weight of the task error at the end of each stage, (N,), s: its length, plus w at the last one."""
         return np.append(np.full(self.stages - 1, self.dt), self.dt + self.terminal_weight)
 
     def cost(self, positions: Array, normals: Array | None = None) -> Any:
@@ -127,7 +127,7 @@ class DecisionRecord:
 
     @cached_property
     def scale(self) -> float:
-        """The cost that differences of cost are relative to."""
+        """The reference cost for relative differences."""
         return max(LEAST_COST, float(self.cost(self.constant).min()))
 
 
@@ -193,7 +193,7 @@ def _shaped(flat: dict[str, Array], n: int) -> dict[str, Array | None]:
 
 
 class Deviation:
-    """A comparison: how far a recorded value is from what it should be, and how far it may be."""
+    """A comparison: the difference of a recorded value from the expected one, and its tolerance."""
 
     def __init__(self, row: DecisionRecord, what: str, by: Any, allowed: float, **more: Any) -> None:
         # by: differences, of any shape; the largest absolute one counts.
@@ -205,7 +205,7 @@ class Deviation:
 
     @property
     def wrong(self) -> bool:
-        """Whether the difference is too large, or is not a number."""
+        """Whether the difference is too large or NaN."""
         return not self.off <= self.allowed
 
     def to_json(self) -> dict[str, Any]:
@@ -214,7 +214,7 @@ class Deviation:
 
 
 def cost_tolerance(cost: float) -> float:
-    """How much recorded and recomputed costs may differ: rounding of 3 N additions errs by 1e-13, relative."""
+    """Tolerance between recorded and recomputed costs: rounding of 3 N additions causes 1e-13, relative."""
     return 1e-9 * max(cost, LEAST_COST)
 
 
@@ -228,7 +228,7 @@ def conclude(finding: Finding, compared: Iterable[Deviation]) -> Finding:
 
 
 def without_decisions(trace: Trace) -> list[str]:
-    """UGVs that never decided, though they executed something, or got a proposal and were intervened on long enough."""
+    """UGVs without a decision that executed a proposal, or had one during a long enough intervention."""
     # This is no refutation: their proposals may have been withdrawn at once.
     left_out = {*without_proposals(trace), *unreached(trace)}
     asked = [ugv for ugv in trace.ugvs if talk_is_due(trace, ugv) and ugv not in left_out]
@@ -246,7 +246,7 @@ class GateClaim(TraceClaim):
         return trace.meta.get("method") in GATED_METHODS
 
     def check(self, trace: Trace) -> Finding:
-        """Decide the claim; without decisions it holds only if no UGV had anything to decide for long enough."""
+        """Decide the claim; without decisions it holds only if no UGV had to decide for long enough."""
         if len(trace.decisions) and not len(trace.problems) and trace.meta["method"] in ON_TOP:
             return Finding("not_run", evidence={"reason": "the problems of the decisions were not recorded"})
         without = without_decisions(trace)

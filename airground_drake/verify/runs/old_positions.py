@@ -1,8 +1,8 @@
-"""UGVs that act on old positions of each other: what they had heard, and by how much they miss the asynchronous law.
+"""UGVs that act on old positions of each other: received positions, and violations of the asynchronous law.
 
-Towards a place where another UGV was once, D away, with rho the way that it can have gone until it decides again, the
-theorem `old_positions` (coq/Async.v) asks of each step s that n.s >= d + rho - D where D >= d + rho, or D n.s >= rho
-|s|. Nothing is ever restored of what is missed, so it adds up.
+Let D be the distance from an old position of another UGV, and rho the distance that it can drive from there until it
+decides again. The theorem `old_positions` (coq/Async.v) requires of each step s that n.s >= d + rho - D if D >= d +
+rho, otherwise D n.s >= rho |s|. Violations do not recover, so they add up.
 """
 
 from fractions import Fraction
@@ -23,7 +23,7 @@ BITS = 160  # lengths are enclosed to 2^-160 of their denominator
 
 
 def unsure_s(scenario: Scenario) -> float:
-    """How long UGVs reckon with any motion of one whose messages all arrive, s; 0: they share inequalities."""
+    """Age of positions plus a period if all messages arrive, s; 0 under the shared law."""
     if scenario.control.law != "asynchronous" or (link := scenario.ugv_links) is None:
         return 0.0
     periods = ceil(decimal(link.delay_s) / decimal(scenario.control.period_s) * (1 - Fraction(1, 10**9)))
@@ -31,25 +31,25 @@ def unsure_s(scenario: Scenario) -> float:
 
 
 def heard_at(trace: Trace, by: str, of: str) -> Indices:
-    """The control sample of the last position of a UGV that another one has at each sample, (S,); -1: of no sample."""
+    """The control sample of the last received position of a UGV at each sample, (S,); -1 without one."""
     t, heard = trace.sampled("t_s"), trace.sampled(f"{by}.heard_{of}_s")
     k = np.searchsorted(t, heard - TIME_TOLERANCE_S).clip(0, len(t) - 1)
     return np.where((np.abs(t[k] - heard) <= TIME_TOLERANCE_S) & (k <= np.arange(len(t))), k, -1)
 
 
 def heard_places(trace: Trace, by: str, of: str) -> Array:
-    """Where a UGV was when it sent the last position that another one has at each sample, (S, 3), m."""
+    """The last received position of a UGV at each sample, (S, 3), m."""
     return trace.position(of)[trace.sample_rows][heard_at(trace, by, of)]
 
 
 def unsure_m(trace: Trace, by: str, of: str) -> Array:
-    """How far a UGV can be from that position until it decides again, by its speed limit, (S,), m."""
+    """Largest distance of a UGV from that position until it decides again, (S,), m."""
     since = trace.sampled("t_s") - trace.sampled(f"{by}.heard_{of}_s")
     return trace.scenario.ugvs[of].max_speed_m_s * (since + trace.scenario.control.period_s + SPARE_S)
 
 
 def missed_m(trace: Trace, by: str, of: str, safe_m: float) -> Array:
-    """What the steps of a UGV miss of the law towards another one, (S,), m, rounded up; all without a position."""
+    """Violations of the law towards another UGV, (S,), m, rounded up; without a position, whole steps."""
     ends, t, last = period_ends(trace), trace.t, float(last_period(trace))
     heard, way = heard_at(trace, by, of), trace.position(by)[ends]
     gone = np.diff(trace.position(of)[ends], axis=0) / np.diff(t[ends])[:, None]
@@ -69,7 +69,7 @@ def missed_m(trace: Trace, by: str, of: str, safe_m: float) -> Array:
 
 
 def _missed(offset: Array, step: Array, unsure: Fraction, safe: Fraction) -> Fraction:
-    """What one step misses, from above, m; of what is kept half of the distance, at least, is left."""
+    """Upper bound of one step's violation, m."""
     w, s = ([Fraction(axis) for axis in vector.tolist()] for vector in (offset, step))
     squared, along = sum(a * a for a in w), sum(a * b for a, b in zip(w, s, strict=True))
     missed = max(unsure * _root(sum(a * a for a in s))[1] - along, Fraction(0)) / (safe / 2)
@@ -81,7 +81,7 @@ def _missed(offset: Array, step: Array, unsure: Fraction, safe: Fraction) -> Fra
 
 
 def _root(square: Fraction | int) -> tuple[Fraction, Fraction]:
-    """A square root from below and from above."""
+    """Lower and upper bound of a square root."""
     given = Fraction(square)
     root, whole = isqrt(given.numerator * given.denominator << 2 * BITS), given.denominator << BITS
     return Fraction(root, whole), Fraction(root + 1, whole)

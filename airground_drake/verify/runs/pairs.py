@@ -1,8 +1,8 @@
-"""The pairs of bodies that must keep apart, by the scenario, and where they are during a run.
+"""The pairs of bodies that must keep apart, and their positions and distances during a run.
 
 A barrier is an obstacle or a wall of the arena, of one convex part or many: its distance is the least over its parts.
-If it moves, its parts are about the origin of its frame, and distances are those of the robot's place from there.
-Everything about places and distances is here: nobody else computes them.
+If it moves, its parts are relative to the origin of its frame, and so are positions of the robot. All positions and
+distances for claims are computed here.
 
 A distance that users see is the gap of a pair, beside the gap required: between surfaces, below 0 if the bodies
 overlap. `least_gap` and `gap_over_time` are its only sources. Bodies keep distances of a robot's centre from the core
@@ -38,7 +38,7 @@ from airground_drake.verify.pair_kinds import ASYNCHRONOUS, MOVING, apart
 
 
 class Pair(NamedTuple):
-    """A robot, and a barrier or another robot that it must keep away from."""
+    """A robot, and a barrier or another robot that it must avoid."""
 
     first: str  # the robot
     second: str  # the barrier or other robot
@@ -70,21 +70,21 @@ class Pair(NamedTuple):
 
     @property
     def safe_m(self) -> float:
-        """Distance of the robot's centre from the other's core that is to be kept, m."""
+        """Required distance of the robot's centre from the other's core, m."""
         return self.required_m + self.radii_m
 
     @property
     def law_m(self) -> float:
-        """Distance of the robot's steered point from the other's core, or steered point, that the law keeps, m."""
+        """The law's distance of the robot's steered point from the other's core or steered point, m."""
         return self.safe_m + self.more_m
 
     def keeps_m(self, period_s: float) -> float:
-        """`law_m`, less errors of measured positions, and V h: who keeps it at a sample keeps d for a period."""
+        """`law_m` less errors, plus V h: with it at a sample, d is kept for a period whatever the barrier does."""
         return self.law_m - self.error_m + self.speed_m_s * period_s
 
 
 class Gap(NamedTuple):
-    """Where the gap of a pair was smallest."""
+    """The smallest gap of a pair."""
 
     pair: Pair  # the two bodies
     gap_m: float  # distance of their surfaces; below 0 they overlap
@@ -139,7 +139,7 @@ def pairs_by(
 
 @per_trace
 def bounds_of(trace: Trace) -> dict[str, Bounds]:
-    """How far the bodies of the robots may be from where the law steers them, by name."""
+    """Bounds of the robots' bodies, by name."""
     robots = trace.scenario.robots
     return {
         name: trace.plant(name).bounds(robots[name].max_speed_m_s)._replace(**trace.scenario.seen(name))
@@ -167,7 +167,7 @@ def parts_of(trace: Trace) -> Parts:
 
 @per_trace
 def cores_of(trace: Trace) -> dict[str, Cores]:
-    """The cores of the convex parts of each barrier, by its name."""
+    """The cores of each barrier's convex parts, by name."""
     cores = dict[str, Cores]()
     for name, barrier in trace.scenario.barriers.items():
         parts, place = convex_parts(barrier), np.array([barrier.position_m or [0.0, 0.0, 0.0]], dtype=np.float64)
@@ -189,7 +189,7 @@ def seen_from(trace: Trace, robot: str, other: str) -> Array:
 
 @per_trace
 def carried(trace: Trace) -> list[tuple[Indices, Array]]:
-    """Numbers of the parts that are at rest, and of those of each barrier that moves, with the places of its origin."""
+    """Indices of static parts, and of the parts of each moving barrier with the positions of its origin."""
     parts, barriers = parts_of(trace), trace.scenario.barriers
     still = np.array([barriers[name].moves is None for name in parts.names], dtype=np.bool_)
     moving = [(np.flatnonzero(parts.owner == k), trace.body(parts.names[k])) for k in np.flatnonzero(~still).tolist()]
@@ -197,7 +197,7 @@ def carried(trace: Trace) -> list[tuple[Indices, Array]]:
 
 
 def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar: bool) -> Contacts:
-    """Pairs of a place and a part of a barrier within a distance, m; places, (K, 3), m, are in the order of a way."""
+    """Pairs of a position and a part of a barrier within a distance, m; positions (K, 3), m, along a path."""
     # Barriers that move are taken where they are at each of the K rows; those that are absent there count for nothing.
     parts = parts_of(trace)
     near_parts = list[Contacts]()
@@ -214,7 +214,7 @@ def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar
 
 @per_trace
 def lifetimes(trace: Trace) -> tuple[Indices, Indices]:
-    """The row from which on each convex part is there, and that from which on it is not, (m,)."""
+    """The first row at which each convex part exists, and the first one after it, (m,)."""
     parts, end = parts_of(trace), len(trace.t) - 1
     first = np.array([trace.there_from(name) for name in parts.names], dtype=np.intp)
     last = np.array([trace.there_until(name) for name in parts.names], dtype=np.intp)
@@ -254,7 +254,7 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
 
 
 def start_margin(trace: Trace, pair: Pair) -> float:
-    """By how much the bodies of a pair exceed their distance when both are first there, m; inf where none is needed."""
+    """Margin of a pair's bodies to their distance when both first exist, m; inf if none is needed."""
     # Commands that were given before then lead a body with a delay on for that time, so its way counts, too.
     if pair.under_way_s is None:
         return inf
@@ -272,7 +272,7 @@ def at_appearance(trace: Trace, gap: Gap) -> bool:
 
 @per_trace
 def steered_margin(trace: Trace, pair: Pair) -> float:
-    """The least distance of the points of a pair that the law steers, less what the law keeps, m."""
+    """The least distance of a pair's steered points minus the law's distance, m."""
     cores = cores_of(trace).get(pair.second, CENTRE)
     second = trace.position(pair.second) if pair.second in trace.robots else origin_of(trace, pair.second)
     way = (trace.position(pair.first) - second)[pair.rows]
@@ -280,7 +280,7 @@ def steered_margin(trace: Trace, pair: Pair) -> float:
 
 
 def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
-    """The least distance of a pair whose bodies do not move straight: segments that may be too near are divided."""
+    """The least distance of a pair on curved paths, by dividing segments that may be too near."""
     cores = cores_of(trace).get(pair.second, CENTRE)
     planar = is_planar(trace, pair.first)
     way = seen_from(trace, pair.first, pair.second)[pair.rows]
@@ -315,7 +315,7 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
 
 
 def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:
-    """Where a body is at shares (n,) of the time from a row to the next, (n, 3), m; origins of barriers, too."""
+    """Positions of a body, or a barrier's origin, at shares (n,) of the time between two rows, (n, 3), m."""
     if name not in trace.robots:
         way = origin_of(trace, name)
         return way[row] + shares[:, None] * (way[row + 1] - way[row])
@@ -363,7 +363,7 @@ def distances_when_there(trace: Trace, robot: str) -> dict[str, float]:
 
 
 def are_too_near(trace: Trace, robot: str, places: Array, t_s: float, by_m: float) -> Flags:
-    """At which places (K, 3), m, of its steered point a robot is by more than `by_m` too near to a barrier, (K,)."""
+    """Positions (K, 3), m, of a steered point that are too near to a barrier by more than `by_m`, (K,)."""
     too_near = np.zeros(len(places), dtype=np.bool_)
     pairs = pairs_beside(trace, robot)
     parts = parts_of(trace)
@@ -412,14 +412,14 @@ def apart_of(trace: Trace) -> Array:
 
 @per_trace
 def off_m_of(trace: Trace, name: str) -> float:
-    """How far a body may be from the straight line between its positions at two rows, m."""
+    """Largest deviation of a body from the straight line between two rows, m."""
     if name not in trace.robots:
         return 0.0
     return float(trace.plant(name).bends_m(trace.t, trace.signals(name)).max(initial=0.0))
 
 
 def least_of(bounds: Array, most: int, value: Callable[[int], float]) -> list[int]:
-    """Indices of the smallest of K values, in increasing order; few values have to be computed; `bounds` (K,)."""
+    """Indices of the smallest of K values, sorted; lower `bounds` (K,) avoid computing most values."""
     if len(bounds) <= most:
         return list(range(len(bounds)))
     enough = max(value(int(k)) for k in np.argsort(bounds, kind="stable")[:most])

@@ -1,8 +1,8 @@
-"""Robots beside obstacles that may move, period by period: what each kept, lost, and did.
+"""Robots beside obstacles that may move, period by period: distances and reactions.
 
-A robot keeps n.v >= -(D - d - V h) / h, and n.v >= 0 where D < d + V h: it is *passive* there. Whatever it then loses
-of min(D, d + V h), the obstacle has moved itself. Where a measured distance D' may be off by e, and D' - e >= d + V h,
-the first inequality with D' - e will do as well (theorem Passive.own_doing, `advances`).
+A robot keeps n.v >= -(D - d - V h) / h, or n.v >= 0 if D < d + V h: then it is *passive*. Any loss below min(D, d + V
+h) is due to the obstacle's own motion. With a measured distance D' and errors up to e, the first inequality may hold
+for D' - e in place of D, if D' - e >= d + V h (theorem Passive.own_doing, `advances`).
 """
 
 from fractions import Fraction
@@ -33,14 +33,14 @@ def period_ends(trace: Trace) -> Indices:
 
 
 def last_period(trace: Trace) -> Fraction:
-    """How long the last control period of a run is, in periods."""
+    """Length of the last control period of a run, in periods."""
     ends, period = period_ends(trace), trace.scenario.control.period_s
     lasting = float(trace.t[ends[-1]] - trace.t[ends[-2]])
     return Fraction(1) if abs(lasting - period) <= TIME_TOLERANCE_S else Fraction(lasting) / Fraction(period)
 
 
 class Periods(NamedTuple):
-    """The control periods in which both bodies of a pair are there, K of them."""
+    """The K control periods in which both bodies of a pair exist."""
 
     pair: Pair  # a robot and an obstacle that may move
     row: Indices  # at which each begins, (K,)
@@ -53,12 +53,12 @@ class Periods(NamedTuple):
 
     @property
     def passive(self) -> Flags:
-        """Where the robot is so near that it only promises not to come nearer itself."""
+        """Whether the robot is so near that it only promises not to come nearer itself."""
         return self.apart_m < self.keeps_m
 
     @property
     def kept(self) -> Flags:
-        """Where all hypotheses are met: d is kept, whatever the obstacle does within V."""
+        """Whether all hypotheses are met, so that d is kept if the obstacle is no faster than V."""
         return ~self.passive & (self.missed_m <= DISTANCE_TOLERANCE_M) & ~self.too_fast
 
     @property
@@ -67,12 +67,12 @@ class Periods(NamedTuple):
 
     @property
     def away_m_s(self) -> Array:
-        """How fast the robot's command leads away from the obstacle, (K,), m/s."""
+        """The commanded speed away from the obstacle, (K,), m/s."""
         return np.asarray(np.einsum("ka,ka->k", self.normal, self.velocity))
 
     @property
     def retreated(self) -> Flags:
-        """Where it was passive and went away from the obstacle as fast as that may come."""
+        """Whether it was passive and retreated as fast as the obstacle may approach."""
         return self.passive & (self.away_m_s >= self.pair.speed_m_s - AT_LIMIT_M_S)
 
 

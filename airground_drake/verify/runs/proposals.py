@@ -1,4 +1,4 @@
-"""Proposals of a run, as recorded; what was accepted of them, and for how long; when UGVs were intervened on."""
+"""Recorded proposals of a run, their acceptances, and the interventions on UGVs."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -90,7 +90,7 @@ def proposal_of(trace: Trace, number: int) -> ProposalRecord:
 
 
 class Acceptance(NamedTuple):
-    """An accepted proposal, from its acceptance until the UGV gives it back, it is withdrawn, or the run ends."""
+    """An accepted proposal, from its acceptance until the UGV ends it, it is withdrawn, or the run ends."""
 
     on: ProposalRecord  # the proposal
     t_s: float  # when it was accepted
@@ -107,7 +107,7 @@ def acceptances(trace: Trace) -> dict[str, list[Acceptance]]:
 
 
 def below_avoidance(trace: Trace) -> tuple[int, int]:
-    """How many executed interventions were below avoidance, as method (d) has them, and how many there were."""
+    """The numbers of executed interventions below avoidance, as under method (d), and of all."""
     count = sum(len({*trace.sampled(f"{ugv}.executing").tolist()} - {-1.0}) for ugv in trace.ugvs)
     return (count if trace.meta["method"] == METHOD else 0), count
 
@@ -144,13 +144,13 @@ def intervening(trace: Trace, ugv: str) -> Array:
 
 
 def talk_is_due(trace: Trace, ugv: str) -> bool:
-    """Whether a UGV is intervened on for longer than a proposal and a decision on it take."""
+    """Whether an intervention on a UGV lasts longer than a proposal and a decision take."""
     periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
     return bool((np.diff(intervening(trace, ugv)) > periods).any())
 
 
 def without_proposals(trace: Trace) -> list[str]:
-    """UGVs for which policies were asked, but that got no proposal: the UAV found no way, or its policies failed."""
+    """UGVs without a proposal although policies were asked: no path was found, or the policies failed."""
     asked, got = {*trace.plans["ugv"]}, {*trace.proposals["robot"]}
     return [ugv for ugv in trace.ugvs if ugv in asked - got]
 
@@ -163,7 +163,7 @@ def unreached(trace: Trace) -> set[str]:
 
 
 def lost_at_the_end(trace: Trace) -> list[str]:
-    """UGVs that are still intervened on at the end, and for which the UAV found no way when it last looked for one."""
+    """UGVs in an intervention at the end for which the UAV's last search found no path."""
     return [ugv for ugv in trace.ugvs if _is_lost(trace, ugv)]
 
 
@@ -178,13 +178,13 @@ def _is_lost(trace: Trace, ugv: str) -> bool:
 
 
 def reasons(trace: Trace) -> dict[str, str]:
-    """Why UGVs got no proposal, as the last policy that was asked said; UGVs without a reason are left out."""
+    """The reasons of the last policy asked, by UGV without a proposal; UGVs without a reason are left out."""
     said = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
     lost = [*without_proposals(trace), *lost_at_the_end(trace)]
     return {ugv: str(said[ugv]) for ugv in dict.fromkeys(lost) if ugv in said.index}
 
 
 def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
-    """Not run: UGVs were intervened on, but no message of a kind was recorded."""
+    """The finding `not_run`: there were interventions, but no message of a kind was recorded."""
     reason = f"{', '.join(ugvs)}: in mode 'intervening', but the trace has no {kind}"
     return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})

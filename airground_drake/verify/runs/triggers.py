@@ -32,7 +32,7 @@ def recorded_events(trace: Trace, ugv: str) -> list[Transition]:
 
 
 def column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflict | None:
-    """First row at which the columns on triggers and releases do not agree with the events before it."""
+    """First row at which the columns on triggers and releases contradict the earlier events."""
     t = trace.t
     for kind, name in (("trigger", "triggered_at_s"), ("release", "released_at_s")):
         times = np.array([-1.0, *(time for time, what in events if what == kind)])
@@ -48,7 +48,7 @@ def column_conflict(trace: Trace, ugv: str, events: list[Transition]) -> Conflic
 
 
 def decision_variable(trace: Trace, ugv: str) -> NormSignal:
-    """x(t) of (15) from positions and noise of the trace and the preset of its scenario, not the recorded one."""
+    """x(t) of (15), recomputed from the trace's positions and noise and the scenario's preset."""
     return _signal(trace, ugv, trace.column(f"{ugv}.noise_m"))
 
 
@@ -105,7 +105,7 @@ def noise_conflict(trace: Trace, ugv: str) -> Conflict | None:
 
 
 def noise_off(t: Array, noise: Array, given: Decision) -> Array:
-    """By how much each of n noises, (T, n), m, is off where it should be at each row but the first, (T - 1, n), m."""
+    """Differences of n noises, (T, n), m, from their expected values at each row but the first, (T - 1, n), m."""
     # It starts at 0. In each of its periods h one sample w, of standard normal size, is held: between rows n moves at
     # the rate s w / sqrt(h) - leak n.
     dt, h = np.diff(t), given.noise_period_s
