@@ -181,7 +181,7 @@ def build_model(
     if channel:
         down, up = make_links(channel)
         start, sent = next(iter(plans.values())).start(), _named("sent", plans).values()
-        links = Downlink(down, sent, start, period, retry, components.lost_at(scenario)), Uplink(up, period)
+        links = Downlink(down, sent, start, period, retry, [*scenario.lost_s.values()]), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}
     if scenario.sensing:
         error_m = scenario.position_error_m + (scenario.faults or Faults()).position_error_m
