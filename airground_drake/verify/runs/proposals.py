@@ -144,7 +144,7 @@ def intervening(trace: Trace, ugv: str) -> Array:
 
 
 def talk_is_due(trace: Trace, ugv: str) -> bool:
-    """Whether a UGV is intervened on for longer than a proposal and a decision on it take, by a UAV that is not lost."""
+    """Whether a UAV that is not lost intervenes on a UGV for longer than a proposal and a decision on it take."""
     periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
     spells = np.minimum(intervening(trace, ugv), trace.scenario.lost_s[ugv])
     return bool((np.diff(spells) > periods).any())
