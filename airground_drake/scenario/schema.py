@@ -814,6 +814,12 @@ class Scenario:
         listed = self.aerial[uav].ugvs
         return tuple(ugv for ugv in self.ugvs if ugv in listed or not listed)
 
+    @property
+    def lost_s(self) -> dict[str, float]:
+        """When the UAV in charge of each UGV is lost, s, by UGV in their order; infinite: never."""
+        lost = {ugv: robot.lost_at_s or math.inf for uav, robot in self.aerial.items() for ugv in self.in_charge(uav)}
+        return {ugv: lost[ugv] for ugv in self.ugvs}
+
     def kind_of(self, name: str) -> Kind:
         """What the body of this name is.
 

@@ -14,7 +14,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Mult
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, ScenarioError, UnknownNameError, short
+from airground_drake.base.errors import PluginError, ScenarioError, UnknownNameError, described, raised_as, short
 from airground_drake.base.registry import METHODS, UAV_TASKS, Method, method_of
 from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.world import World
@@ -182,7 +182,7 @@ def build_model(
     if channel:
         down, up = make_links(channel)
         start, sent = next(iter(plans.values())).start(), _named("sent", plans).values()
-        links = Downlink(down, sent, start, period, retry, components.lost_at(scenario)), Uplink(up, period)
+        links = Downlink(down, sent, start, period, retry, [*scenario.lost_s.values()]), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}
     if errors := errors_of(scenario, world):
         parts["sensing"] = PositionSensing(errors, world)
@@ -366,13 +366,14 @@ def _assembled(
         wanted = renamed.get(port.get_system(), NO_NAMES).get(port.get_name(), port.get_name())
         if builder.IsConnectedOrExported(port):
             continue
-        if wanted in named:
-            builder.Connect(named[wanted], port)
-        elif wanted in inputs:
-            builder.ConnectInput(wanted, port)
-        else:
-            builder.ExportInput(port, wanted)
-            inputs.add(wanted)
+        with raised_as(lambda error: PluginError(described(error))):  # a user's block may have ports of other sizes
+            if wanted in named:
+                builder.Connect(named[wanted], port)
+            elif wanted in inputs:
+                builder.ConnectInput(wanted, port)
+            else:
+                builder.ExportInput(port, wanted)
+                inputs.add(wanted)
     for key in named if exported is None else exported:
         builder.ExportOutput(named[key], key)
     return _built(name, builder)

@@ -53,6 +53,7 @@ def crossed() -> Trace:
 def test_a_uav_alone_that_is_lost_helps_nobody_any_more(run: Run) -> None:
     trace = run("crossing", "d", set=["uav.lost_at_s=5", "duration_s=15"])
     assert trace.proposals.empty
+    assert {decided(claim, trace).status for claim in ("GATE-PLAN", "LIVE-HYP")} == {"holds"}  # nobody was asked
     assert not {event["robot"] for event in trace.events if event["kind"] == "arrival"} - {"uav"}
     assert not faults_of(trace)
 

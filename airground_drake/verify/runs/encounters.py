@@ -35,6 +35,7 @@ from airground_drake.verify.runs.pairs import (
 )
 from airground_drake.verify.runs.passive import AT_LIMIT_M_S, STANDING_M_S, Periods, periods_of
 
+SHOWN_M_S = 0.005  # a sentence shows a smaller speed as 0.00 m/s: the robot stood
 BLOCKED_M_S = 1e-6  # an inequality blocks a retreat if the retreat would miss it by more than this, m/s
 
 
@@ -263,7 +264,7 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) 
 
 def _reaction(speed: float, away: float, limit: float) -> str:
     """A robot's reaction in words, from its speed, its speed away from the obstacle, and its limit, m/s."""
-    if speed <= STANDING_M_S:
+    if speed < SHOWN_M_S:
         return "stood"
     if away <= STANDING_M_S:
         return "moved aside"

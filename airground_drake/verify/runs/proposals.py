@@ -144,9 +144,10 @@ def intervening(trace: Trace, ugv: str) -> Array:
 
 
 def talk_is_due(trace: Trace, ugv: str) -> bool:
-    """Whether an intervention on a UGV lasts longer than a proposal and a decision take."""
+    """Whether a UAV that is not lost intervenes on a UGV for longer than a proposal and a decision take."""
     periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
-    return bool((np.diff(intervening(trace, ugv)) > periods).any())
+    spells = np.minimum(intervening(trace, ugv), trace.scenario.lost_s[ugv])
+    return bool((np.diff(spells) > periods).any())
 
 
 def without_proposals(trace: Trace) -> list[str]:
