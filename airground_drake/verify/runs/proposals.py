@@ -144,10 +144,10 @@ def intervening(trace: Trace, ugv: str) -> Array:
 
 
 def talk_is_due(trace: Trace, ugv: str) -> bool:
-    """Whether a UAV that is not lost intervenes on a UGV for longer than a proposal and a decision take."""
-    periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
-    spells = np.minimum(intervening(trace, ugv), trace.scenario.lost_s[ugv])
-    return bool((np.diff(spells) > periods).any())
+    """Whether a UAV with policies, not lost, intervenes on a UGV for longer than a proposal and a decision take."""
+    given = trace.scenario
+    spells = np.minimum(intervening(trace, ugv), given.lost_s[ugv] if given.intervention.policies else 0.0)
+    return bool((np.diff(spells) > given.intervention.period_s + given.gatekeeper.period_s).any())
 
 
 def without_proposals(trace: Trace) -> list[str]:
