@@ -47,16 +47,18 @@ class Layer(NamedTuple):
 
 @njit(cache=True)
 def fill_half_spaces(
-    position: Array,
-    mobility: Array,
-    still: Array,
-    parts: Array,
-    carrier: Indices,
-    others: Indices,
-    places: Array,
-    distance: Array,
-    share: Array,
+    position: Array,  # of the robot, (3,), m
+    mobility: Array,  # of the robot, (3,), see `Neighbours`
+    still: Array,  # outlines at rest, (m, W)
+    parts: Array,  # outlines that move, (P, W)
+    carrier: Indices,  # rows in `places` of the bodies of the parts, (P,)
+    others: Indices,  # the n of these parts that the robot keeps away from, (n,)
+    places: Array,  # of the bodies that move, (M, 3), m
+    distance: Array,  # safe distances from the cores, (m + n,), m
+    share: Array,  # shares of the inequalities, (m + n,); with one below 0 (see `Neighbours`) there may be two
     layer: Layer,
+    # Results, (2 (m + n), ...), of which the first K entries count. `which` is about what, static outlines first;
+    # normal . v >= bound, m/s; `retreat` is the speed away that the robot should have, m/s, 0 if it need not retreat.
     which: Indices,
     normal: Array,
     bound: Array,
@@ -66,23 +68,6 @@ def fill_half_spaces(
 
     Of each distance (7) these are the value D, (1), the Jacobian, (2), which is the unit vector n away from what is
     avoided, and from these a bound on n.v, (8) as an inequality.
-
-    Args:
-        position: of the robot, (3,), m.
-        mobility: of the robot, (3,), see `Neighbours`.
-        still: outlines at rest, (m, W).
-        parts: outlines that move, (P, W).
-        carrier: rows in `places` of the bodies of the parts, (P,).
-        others: the n of these parts that the robot keeps away from, (n,).
-        places: positions of the bodies that move, (M, 3), m.
-        distance: safe distances from the cores, (m + n,), m.
-        share: shares of the inequalities, (m + n,); below 0 as in `Neighbours`: then there may be two of them.
-        layer: the numbers of the layer.
-        which: result, (2 (m + n),): the first K entries say what the constraints are about, counting what is at rest
-            first.
-        normal: result, (2 (m + n), 3); the first K rows.
-        bound: result, (2 (m + n),), m/s; the first K entries.
-        retreat: result, (2 (m + n),), m/s: speeds away that the robot should have, 0 where it need not retreat.
     """
     gain, period, reach, planar = layer.gain, layer.period, layer.sensing_range, mobility[2] == 0.0
     x, y, z = position[0], position[1], position[2]
