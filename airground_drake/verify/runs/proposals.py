@@ -1,6 +1,6 @@
 """Recorded proposals of a run, their acceptances, and the interventions on UGVs."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from typing import Any, NamedTuple
@@ -12,7 +12,6 @@ from airground_drake.base.errors import TraceError
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import unpacked
-from airground_drake.verify.finding import Finding
 
 METHOD = "d"  # only this method has tries and rests, and predicts where an accepted intervention leads
 GATED_METHODS = ("c", "d")  # methods with an optimising gatekeeper
@@ -183,9 +182,3 @@ def reasons(trace: Trace) -> dict[str, str]:
     said = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
     lost = [*without_proposals(trace), *lost_at_the_end(trace)]
     return {ugv: str(said[ugv]) for ugv in dict.fromkeys(lost) if ugv in said.index}
-
-
-def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
-    """The finding `not_run`: there were interventions, but no message of a kind was recorded."""
-    reason = f"{', '.join(ugvs)}: in mode 'intervening', but the trace has no {kind}"
-    return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
