@@ -35,8 +35,10 @@ def over(given: Channel | None, scenario: str = "lab", run: str = "d", *more: st
     ("case_b", "b", ()), ("case_b", "c", ()), ("case_b", "d", ()), ("doorway", "d", ()),
     ("two_uavs", "d", ("uavs.south.lost_at_s=0", "duration_s=16")),
 ])  # fmt: skip
-def test_a_channel_that_does_nothing_changes_nothing(scenario: str, name: str, more: tuple[str, ...]) -> None:
-    without, silent = over(None, scenario, name, *more), over(Channel(), scenario, name, *more)
+def test_a_channel_that_does_nothing_changes_nothing(
+    run: Run, scenario: str, name: str, more: tuple[str, ...]
+) -> None:
+    without, silent = run(scenario, name, set=more), over(Channel(), scenario, name, *more)
     for table in ("states", "samples", "decisions", "proposals", "plans"):
         both = (getattr(trace, table).drop(columns="answer", errors="ignore") for trace in (without, silent))
         pd.testing.assert_frame_equal(*both, check_exact=True)
