@@ -34,12 +34,9 @@ from airground_drake.commands import COMMANDS
 from airground_drake.report.view.plane import thumbnail_of
 from airground_drake.scenario import json_schema
 from airground_drake.scenario.keys import sections
-from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.shipped import shipped
 from airground_drake.sim import graphviz
-from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.sim.diagram import build_diagram, method_drawn
-from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import Claim
 from airground_drake.verify.proofs import THEOREMS, runs
 
@@ -110,19 +107,11 @@ def gallery(scenarios: Sequence[str] = ()) -> str:
         runs = [run for run, spec in scenario.runs.items() if spec.composition == "augmented"]
         lines += ["", f"## {html.escape(scenario.title or name, quote=False)}", "", '<div class="gallery">']
         for run in dict.fromkeys((runs[0], runs[-1])):
-            drawn = thumbnail_of(_made(scenario, run), f"{name}-{run}")
+            drawn = thumbnail_of(simulate(scenario, run, engine="batch"), f"{name}-{run}")
             says = METHODS[scenario.runs[run].method].says
             lines.append(f"<figure>{drawn}<figcaption>Run {run}: {says}</figcaption></figure>")
         lines += ["</div>", "", f"    airground report {name}"]
     return "\n".join([*lines, ""])
-
-
-def _made(scenario: Scenario, run: str) -> Trace:
-    """A run by the compiled loop, which is Drake's to the bit and takes a fraction of the time; else by Drake."""
-    try:
-        return Batch(scenario, run).simulate()
-    except LeftToDrakeError:
-        return simulate(scenario, run)
 
 
 def extending() -> str:
