@@ -203,7 +203,7 @@ class OutcomeGatekeepers(Gatekeepers):
             around,
             still=still,
             distances=np.concatenate([self._world.keep(i, still), around.distances[m:]]),
-            shares=np.concatenate([np.ones(len(still)), around.shares[m:]]),
+            shares=np.concatenate([self._world.shares(i, still), around.shares[m:]]),
             asked=tuple(asked),
         )
         return seen, basis

@@ -255,20 +255,20 @@ class World:
         ]).reshape(others.shape)  # fmt: skip
         return Neighbours(
             members, carrier, others, self.still, parts, np.array(distance).reshape(len(members), -1),
-            np.hstack([np.reshape([self._shares(robot, self.still) for robot in robots], (len(robots), -1)), share]),
+            np.hstack([np.reshape([self.shares(i, self.still) for i in members], (len(members), -1)), share]),
             _rows([robot.mobility for robot in robots]), np.array([robot.max_speed_m_s for robot in robots]),
         )  # fmt: skip
 
     def _share(self, robot: Body, other: Body) -> float:
         """The share of the inequality that a robot takes beside a moving body; negative as in `Neighbours`."""
         if other.kind not in ROBOTS:
-            return float(self._shares(robot, other.shape[:1])[0])
+            return float(self.shares(self.index(robot.name), other.shape[:1])[0])
         unsure_m = self.unsure_s * other.max_speed_m_s if robot.kind == other.kind == "ugv" else 0.0
         return -unsure_m or 0.5
 
-    def _shares(self, robot: Body, rows: Array) -> Array:
+    def shares(self, robot: int, rows: Array) -> Array:
         """The parts of inequalities that a robot takes beside obstacles (m, W): (m,)."""
-        return np.where(rows[:, outline.SPEED] > 0.0, -robot.error_m or 1.0, 1.0)
+        return np.where(rows[:, outline.SPEED] > 0.0, -self.bodies[robot].error_m or 1.0, 1.0)
 
     def keep(self, robot: int, rows: Array) -> Array:
         """Distances that the law keeps between a robot's steered point and the cores of obstacles (m, W): (m,), m."""
