@@ -57,7 +57,7 @@ NOISY = (
     ("crowd", ["duration_s=6", "control.avoidance_gain_1_s=20"]),
     ("minimal", [  # a remembered rock that may move
         'sensing={"position_error_m": 0.1, "errors": "sideways"}', "duration_s=10", "control.avoidance_gain_1_s=19",
-        "obstacles.rock.max_speed_m_s=1",
+        "obstacles.rock.max_speed_m_s=1", "channel=null",
     ]),
 ])  # fmt: skip
 def test_a_run_with_errors_of_positions_over_a_channel_has_no_fault(scenario: str, given: list[str]) -> None:
