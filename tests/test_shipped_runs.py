@@ -23,14 +23,12 @@ LEFT = {"noisy_link": "a channel", "two_uavs": "several UAVs"}
 
 
 def once(work: Callable[..., Any], own: int = 0) -> Callable[..., Any]:
-    """A function whose result, or a method (`own=1`) whose result, is that of its first call with the same data."""
+    """A function, or a method (`own=1`), that gives for the same data what it gave for them first."""
     known: dict[bytes, Any] = {}
 
     def remembered(*given: Any, **named: Any) -> Any:
         key = pickle.dumps((given[own:], named))
-        if key not in known:
-            known[key] = work(*given, **named)
-        return known[key]
+        return known[key] if key in known else known.setdefault(key, work(*given, **named))
 
     return remembered
 

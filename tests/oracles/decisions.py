@@ -213,9 +213,7 @@ def compare_routes(trace: Trace, planned: Sequence[DecisionRecord]) -> Iterator[
             yield Deviation(row, "a relaxation that the route has not", [len(arrays), *numbers], 0.0)
         if row.given["route_bound"] != -1.0 and row.given["status"] == "optimal":
             yield Deviation(row, "a bound without unit normals", float(not row.unit_normals), 0.0)
-    for each in bounds_of_plans(trace, planned):
-        if each.row.given["route_bound"] == -1.0:
-            continue
+    for each in (each for each in bounds_of_plans(trace, planned) if each.row.given["route_bound"] != -1.0):
         yield from compare_bounds(each.row, each.optimum, blocks)
         if each.gap > LARGEST_GAP and not blocks and each.row.given["route"] in PROVED_ROUTES:
             yield compare_with_blocks(each)
