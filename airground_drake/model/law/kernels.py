@@ -135,7 +135,7 @@ def _keep_off(
         retreat[count], bound[count] = 0.0, 0.0
         if excess >= 0.0:
             bound[count] = -excess / period
-        elif sine == 0.0:  # nobody meets both: who cannot tell which way leads away stands
+        elif sine == 0.0:  # no velocity meets both: the robot stands
             normal[count, 0], normal[count, 1], bound[count] = 1.0 - 2.0 * side, 0.0, 1.0
         count += 1
     return count
@@ -174,7 +174,7 @@ def _augmented(lower: Array, normal: Array, bound: Array) -> Array:
     velocity = _scale_back(velocity, normal, bound)
     if _dot(velocity, velocity) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
         return velocity
-    # between two bodies that it touches no margin fits: the exact bounds, which let it slide along
+    # between two touching bodies the margins leave no room: use the exact bounds, which let it slide along
     touched = bound.copy()
     for k in range(len(bound)):
         if bound[k] <= CONTRADICTION_M_S:
@@ -293,9 +293,10 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
     """Slowest velocity with the least maximum violation, up to `ABOVE_LEAST` and `ABOVE_LEAST_M_S`."""
-    # Constraints contradict each other only where a robot is inside several safe distances at once. The wishes of lower
-    # priorities then have no say: they might be hostile. The least violation is found from below: each contradiction
-    # proves that every velocity misses some constraint by a certain amount, and the bounds are lowered by that.
+    # Constraints contradict each other only where a robot is inside several safe distances at once. Lower
+    # priorities then have no influence: they might be hostile. The least violation is found from below: each
+    # contradiction proves that every velocity misses some constraint by a certain amount, and the bounds are lowered
+    # by that amount.
     still = np.zeros(normal.shape[1])
     least, more = 0.0, np.inf
     while more > 1e-14 * least:
