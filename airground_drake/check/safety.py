@@ -55,9 +55,7 @@ def _least_m(run: Run, pair: Pair, enough: float) -> float:
     left = bent / parts**2
     least_m = min(enough, float(lower[~too_near].min(initial=np.inf)))
     begin = run.there(pair.other).start
-    for k in (
-        step for step in np.argsort(lower).tolist() if too_near[step]
-    ):  # skip distant ones
+    for k in (step for step in np.argsort(lower).tolist() if too_near[step]):  # skip distant ones
         fine = run.fine(pair.robot, begin + k, parts) - run.fine(pair.other, begin + k, parts)
         least_m = min(least_m, pair.shape.least_m(fine, least_m + left, parts) - left)
     return least_m

@@ -10,8 +10,8 @@ from airground_drake.study.logs.tracks import Span, Tracks
 LEAST_TOLD_M = 0.0005  # smaller approaches do not count, m
 # A robot that starts farther away from its start in the scenario, and from its safe distance, is named, m.
 ELSEWHERE_M = 0.05
-FASTER = 1.01  # a robot that moves at more than this multiple of its limit is named; less may be the noise of positions
-LONGER = 1.01  # a log that is longer than a scenario by more than this says so
+FASTER = 1.01  # a robot faster than this multiple of its limit is named; less may be position noise
+LONGER = 1.01  # a log longer than the scenario by more than this gets a remark
 # Broken pairs, all pairs, stretches of one pair, and remarks that are printed; `--json` and the page have all.
 MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
 
