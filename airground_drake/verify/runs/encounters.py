@@ -155,15 +155,15 @@ class Encounter(NamedTuple):
             drove = f"{self.first} drove {self.under_way_m:.2f} m on by commands under way"
             return f"{drove}, to {self.gap_m:.2f} m from {self.second}"
         if self.doing == "robot":
-            return f"{self.first} brought itself to {self.gap_m:.2f} m from {self.second}"
+            return f"{self.first} moved to {self.gap_m:.2f} m from {self.second}"
         if self.doing == "nobody" and self.appeared:
             t_s = trace.t[trace.there_from(self.second)]
-            told = f"{self.second} appeared at {t_s:.9g} s too near to {self.first}: nobody's doing"
+            told = f"{self.second} appeared at {t_s:.9g} s too near to {self.first}: not caused by motion"
             if not self.under_way_m:
                 return told
             return f"{told}; {self.first} drove {self.under_way_m:.2f} m on by commands under way"
         if self.doing == "nobody":
-            return f"{self.first} starts {self.gap_m:.2f} m from {self.second}: nobody's doing"
+            return f"{self.first} starts {self.gap_m:.2f} m from {self.second}: not caused by motion"
         speed = f", {self.speed_m_s:.2f} m/s" if self.reaction.startswith("retreated") else ""
         blocked = f", blocked by {' and '.join(self.blocked_by)}" if self.blocked_by else ""
         came = f"{self.second} came to {self.gap_m:.2f} m by its own motion"
