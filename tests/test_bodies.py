@@ -194,7 +194,7 @@ def test_where_it_appears_too_near_is_nobodys_doing() -> None:
     found = {verdict.claim.id: verdict for verdict in judge(trace, ("SAFE-TRACE", "SAFE-HYP"))}
     seen = found["SAFE-TRACE"].counterexample or {}
     assert (seen["t_s"], seen["min_distance_m"]) == pytest.approx((4.2, 0.8))
-    assert seen["why"] == "rock appeared at 4.2 s too near to ugv1: nobody's doing"
+    assert seen["why"] == "rock appeared at 4.2 s too near to ugv1: not caused by motion"
     broken = found["SAFE-HYP"].counterexample or {}
     assert (broken["hypothesis"], broken["t_s"]) == ("safe start", pytest.approx(4.2))
     assert not faults_of(trace)

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import PurePath
 from traceback import extract_tb, format_list, walk_tb
 
-# Longest values and messages, and tracebacks of third-party code, of which only the end is kept, characters.
+# Maximum characters of values, of messages, and of tracebacks of third-party code (the end is kept).
 VALUE_WIDTH, FAULT_WIDTH, TRACEBACK_CHARS = 120, 300, 4000
 
 

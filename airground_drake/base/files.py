@@ -42,7 +42,7 @@ def open_regular(path: Path, flags: int = os.O_RDONLY, *, links: bool = False) -
     """Open a regular file of a possibly hostile folder, without following links or blocking."""
     # links: whether the path may be a link to a regular file: for paths that the user names.
     with suppress(FileNotFoundError):  # the flags may create it
-        # asked before it is opened, too: opening a device may have effects
+        # checked before opening, because opening a device may have effects
         _be_regular(os.stat(path, follow_symlinks=links), path)
     handle = os.open(path, flags | os.O_NONBLOCK | (0 if links else os.O_NOFOLLOW), 0o644)
     try:
@@ -61,7 +61,7 @@ def _be_regular(about: os.stat_result, path: Path) -> None:
 
 def refuse_links(folder: Path) -> None:
     """Refuse a possibly hostile folder that contains links to folders."""
-    # That is asked of a report or saved run before its files are opened; `open_regular` follows no link to a file.
+    # For a report or saved run, before its files are opened; `open_regular` itself follows no link to a file.
     for path in chain(folder.glob("*"), folder.glob("*/*")):
         if path.is_symlink() and path.is_dir():
             raise FolderError(f"{path} is a link; wanted: a folder")
@@ -270,7 +270,7 @@ def write_json(path: Path, value: Any) -> None:
 
 def strict(value: Any, of_others: Callable[[float], Any] = lambda _: None) -> Any:
     """Plain JSON types: numpy values unwrapped, tuples as lists, non-finite numbers as None."""
-    # of_others: what else becomes of numbers that are not finite.
+    # of_others: the replacement of non-finite numbers.
     if isinstance(value, Mapping):
         return {str(key): strict(item, of_others) for key, item in value.items()}
     if isinstance(value, list | tuple | set | frozenset):

@@ -28,7 +28,7 @@ from airground_drake.base import files
 from airground_drake.base.usage import EXIT_TOOL, refuse
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
-# How long killed descendants are waited for, s: on a busy machine they end later than they are killed.
+# Waiting time for killed descendants to end, s: on a busy machine this takes a while.
 PATIENCE_S = 10.0
 
 # Environment in which nothing in the current folder is executed: child interpreters do not import from there, and
@@ -45,7 +45,7 @@ _exit_code: int | None = None
 
 def begin() -> None:
     """Begin a command, before the slow imports; see the module."""
-    gc.set_threshold(100_000)  # what is imported stays: to look for garbage among it took an eighth of the imports
+    gc.set_threshold(100_000)  # no garbage collection of imported modules, which took an eighth of the import time
     has_home = os.path.isabs(os.path.expanduser("~"))
     for name, value in (CURRENT_FOLDER if has_home else CURRENT_FOLDER | NO_HOME).items():
         os.environ.setdefault(name, value)

@@ -45,8 +45,8 @@ def processors() -> int:
 @contextmanager
 def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
     """A pool of `jobs` processes, killed at the end of the block."""
-    # An AirgroundError is raised if a process has died, and nobody in the block has noticed.
-    # The first call forks them, and they see everything that exists then. Where forking is not safe, they start empty.
+    # AirgroundError if a process has died and the block has not raised.
+    # The first call forks them, with all data that exist then. If forking is not safe, they start without data.
     # Calls and results are pickled.
     before = set(multiprocessing.active_children())
     context = multiprocessing.get_context("fork" if forks() else "spawn")

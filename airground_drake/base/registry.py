@@ -312,7 +312,7 @@ PLANTS = Registry(
     },
 )
 
-AS_TOLD = PLANTS.own[0]  # the default: it moves as it is told
+AS_TOLD = PLANTS.own[0]  # the default plant, which follows commands exactly
 
 # Controllers of the UGVs in place of the package's own: subclasses of Drake's System.
 UGV_CONTROLLERS = Registry("controller", "ugv_controllers", {})
@@ -346,7 +346,7 @@ RUN_CLAIMS = Registry(
 )
 
 DISTANCES = "SAFE-TRACE"  # the claim that all distances were kept, which `airground prove` also asks Coq about
-ARRIVAL = "LIVE-GOAL"  # the claim that every robot ends where it is to end; a preset must lead there, or it may fail
+ARRIVAL = "LIVE-GOAL"  # the claim that every robot ends where it must
 
 # Claims about the model, in the order of the report: subclasses of `verify.claim.ModelClaim`.
 MODEL_CLAIMS = Registry(

@@ -11,13 +11,13 @@ UNDECIDED: tuple[Status, ...] = ("inconclusive", "error", "not_run")  # statuses
 EXERCISED = "exercised"
 NOT_EXERCISED = "not_exercised"  # outcome of a claim that passed because nothing could have refuted it
 EXPECTATIONS: tuple[str, ...] = (*STATUSES, EXERCISED)  # allowed alternatives of an expectation
-# What a scenario may expect of a run besides verdicts, as numbers: a run in which nothing happened tests nothing.
+# Numbers that a scenario may expect of a run besides verdicts: a run without events tests nothing.
 COUNTS = {
     "interventions": "At least so many proposals that UGVs began to execute.",
     "messages": "At least so many proposals and answers that were delivered.",
 }
-# The expectation of a claim about which the method promises nothing: whether it holds does not count, but a claim that
-# could not be judged does.
+# The expectation of a claim about which the method promises nothing: any verdict is accepted, but the claim must be
+# judged.
 NOTHING = "nothing"
 
 

@@ -12,7 +12,7 @@ from typing import TypeVar
 from airground_drake.base.errors import FolderError, LimitError, ScenarioError, UnknownNameError, one_line
 
 EXIT_USAGE, EXIT_TOOL = 2, 4
-# Mistakes of the user. Where a command does long work, other errors are faults of the tool.
+# The user's errors. During long work of a command, other errors are internal.
 REFUSALS = (ScenarioError, LimitError, FolderError, UnknownNameError)
 N = TypeVar("N", int, float)
 MOST = 1e15  # largest number that an option takes

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 from .line import DISAGREES, NOT_HERE, OPEN, CheckLine
 
 SCHEMA = "airground_drake.check/3"
-# What the checker alone takes as recorded: a forger may change it in all its places, unnoticed.
+# Parts that the checker alone takes as recorded: a consistent change of these is not detected.
 ALONE = ("policies, seeds and faults", "every part of the report that no line above names")
 CODES = "Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 4 a fault of the checker."
 LIMIT_S = 300.0  # CPU time that a check may take, s. Checks of a run of minutes take seconds.
@@ -78,7 +78,7 @@ def checked(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = 
 
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # numbers out of all proportion are refused by the rules, not by numpy
+            warnings.simplefilter("ignore")  # extreme numbers are refused by the rules, without warnings of numpy
             return check_report(folder, limit_s, told)
     except Disagreement as broken:
         raise UsageError(f"{folder} is not a report: {broken.rule}: {broken.about} is {broken.recorded}") from None

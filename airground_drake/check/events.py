@@ -42,7 +42,7 @@ def check_events(run: Run) -> str:
 
 def _arrivals(run: Run, hits: Sequence[Event]) -> Iterator[Event]:
     """A robot arrives at the first row from which on it stays within the arrival tolerance of its target."""
-    # What it does from its first collision on does not count, except for where it starts.
+    # Its motion after its first collision does not count, except for where it starts.
     for robot, spec in run.robots.items():
         end_s = min((hit.t_s for hit in hits if robot in (hit.robot, hit.other)), default=np.inf)
         before = (run.t_s < end_s) | (np.arange(len(run.t_s)) == 0)

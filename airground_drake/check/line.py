@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 AGREES, DISAGREES, OPEN = "agrees", "DISAGREES", "cannot be checked"
-# Outcomes; the last two are those of `airground check`: nothing to compare with, and another run when simulated.
+# Outcomes; the last two come from `airground check`: nothing to compare with, and a different run when simulated.
 RECORDED, NOT_HERE = "as recorded", "not reproduced here"
 
 
@@ -12,10 +12,10 @@ RECORDED, NOT_HERE = "as recorded", "not reproduced here"
 class CheckLine:
     """One check."""
 
-    claim: str  # identifier of the claim, or what else was checked: report, files, trace, events
+    claim: str  # identifier of the claim, or report, files, trace, events
     run: str  # on which run; '' for the report and the model
     outcome: str  # see above
-    text: str  # what was found, or why nothing was
+    text: str  # the result, or why there is none
     rule: str = ""  # the rule that is broken or cannot be applied; '' if all agrees
     about: str = ""  # the robot, pair, event, decision or file
     t_s: float | None = None  # when in the run; None where there is no time

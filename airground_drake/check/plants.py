@@ -24,14 +24,14 @@ Rows = npt.NDArray[np.intp]
 
 DRIVES = ("unicycle", "ackermann")  # those steered by a hand point
 KINDS = ("first_order", *DRIVES, "lag", "delay")  # kinds of plants; any other is the name of a class
-STRAIGHT_M = 1e-10  # parts of a way that count as straight leave the line by no more, m
+STRAIGHT_M = 1e-10  # largest deviation from a straight line of parts that count as straight, m
 MOST_PARTS = 5000
 
 
 class Taken(NamedTuple):
     """The numbers of a robot's plant: lengths, m; lag and delay, s; and the limit of its commands, m/s."""
 
-    # A drift takes `drift_m` of a distance, and `slip_m` in one period. `drawn_m` is the part of `body_m` by which a
+    # A drift costs the distance `drift_m`, and `slip_m` in one period. `drawn_m` is the part of `body_m` by which a
     # robot that never drives backwards is behind its steered point.
 
     body_m: float

@@ -93,7 +93,7 @@ def _lines(folder: Path, there: Sequence[str], report: Json, limit_s: float) -> 
 
     for name in report["scenario"]["resolved"]["runs"]:
         yield attempt("trace", name, partial(load, name))
-        if name in runs:  # nothing can be said of a trace that is refused
+        if name in runs:  # no claims are checked on a refused trace
             yield attempt("events", name, partial(check_events, runs[name]))
             for claim in DECIDED:
                 yield attempt(claim, name, partial(judge, claim, name))

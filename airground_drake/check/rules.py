@@ -18,7 +18,7 @@ SMALL = 1e-9
 
 
 @dataclass(eq=False)
-class Disagreement(Exception):  # noqa: N818 - what the program looks for, not an error of the program
+class Disagreement(Exception):  # noqa: N818 - a result of the check, not an error of the program
     """The files violate a rule: `recorded` differs from `recomputed`."""
 
     # `about` is the robot, pair, event, decision or file; `t_s` is the time in the run, s, if there is one.

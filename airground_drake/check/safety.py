@@ -55,7 +55,7 @@ def _least_m(run: Run, pair: Pair, enough: float) -> float:
     left = bent / parts**2
     least_m = min(enough, float(lower[~too_near].min(initial=np.inf)))
     begin = run.there(pair.other).start
-    for k in (step for step in np.argsort(lower).tolist() if too_near[step]):  # others are farther than the nearest
+    for k in (step for step in np.argsort(lower).tolist() if too_near[step]):  # skip distant ones
         fine = run.fine(pair.robot, begin + k, parts) - run.fine(pair.other, begin + k, parts)
         least_m = min(least_m, pair.shape.least_m(fine, least_m + left, parts) - left)
     return least_m
@@ -68,11 +68,11 @@ def _parts(bent_m: float) -> int:
 
 def safe_own(run: Run) -> Found | None:
     """SAFE-OWN: in each period no robot comes nearer than min(D, d + V h) to the other body, held as at the sample."""
-    # With plants that take room it is min(D, d_law + V h) less that room, D the distance of the steered points; bodies
-    # that are nearer already may stay so. In segments in which the bodies are nearer than d at an end, it is at least
-    # min(D, d), D the distance of the bodies, once they have been d apart. It is asked from row to row, where the
-    # robot's way from the sample could lead nearer than d + V h. A period beside an obstacle that may move tests the
-    # claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE says the same.
+    # With plants off the steered point it is min(D, d_law + V h) minus their cost, D the distance of the steered
+    # points; bodies that are nearer already may stay so. In segments in which the bodies are nearer than d at an end,
+    # it is at least min(D, d), D the distance of the bodies, once they have been d apart. It is asked from row to row,
+    # where the robot's way from the sample could lead nearer than d + V h. A period beside an obstacle that may move
+    # tests the claim if one at the speed limits could. None: nothing may move, and SAFE-TRACE says the same.
     if not any(map(expected_m_s, run.scenario["obstacles"].values())):
         return None
     period = run.scenario["control"]["period_s"]
@@ -95,7 +95,7 @@ def safe_own(run: Run) -> Found | None:
         if run.apart_m[pair.robot, pair.other] > max(reach, pair.safe_m + longest):
             continue
         apart_m = pair.shape.held_m(run.apart(pair), run.apart(pair), run.apart(pair), np.inf)[0]
-        kept = apart_m >= pair.safe_m - SMALL  # who starts or appears too near is not asked until once apart
+        kept = apart_m >= pair.safe_m - SMALL  # a pair that starts too near is judged once it has been apart
         too_near = np.logical_or.accumulate(kept)[:-1] & ~(kept[:-1] & kept[1:])
         for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
             if robot in ways:
@@ -226,7 +226,7 @@ def gain_of_pair(pair: Pair, gain: Fraction) -> Fraction:
 
 def measured_shortfall_m(run: Run, law: Pair, rows: Rows, gain: Fraction, last: Fraction) -> Fraction:
     """The largest violation of a pair's inequality with measured positions, m per period."""
-    # The steps are true ones. A pair that stands lacks nothing, nor does one that is far.
+    # The steps are true ones. A pair that stands or is far violates nothing.
     samples = np.searchsorted(run.sample_row, rows[:-1])
     own_m, other_m = run.position_m[law.robot][rows], run.position_m[law.other][rows]
     seen = run.seen_m(law.robot)[samples] - (run.seen_m(law.other)[samples] if law.other in run.robots else 0.0)
@@ -291,8 +291,8 @@ def safe_hyp(run: Run) -> Found:
 
 def _lost_to_old_positions_m(run: Run, pair: Pair, period_s: float) -> float:
     """The sum of violations of the asynchronous law by two UGVs, m."""
-    # A step that misses nothing ends where the other's disc cannot come until that one decides again, or leads away
-    # from all of it, or is none. What is missed is missed for good. Pairs that stay far need no law.
+    # A step obeys the law if it ends outside of the other's disc, leads away from all of the disc, or is 0. Violations
+    # do not recover. Pairs that stay far need no law.
     ends = np.append(run.sample_row, len(run.t_s) - 1)
     spans = np.diff(run.t_s[ends])
     longest, lost, too_far = max(float(spans.max()), period_s), Fraction(), True

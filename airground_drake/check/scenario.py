@@ -33,14 +33,14 @@ class Pair(NamedTuple):
     # V, the speed at which an obstacle is expected to move at most; above 0 the passive law is in force.
     moves_m_s: float = 0.0
     more_m: float = 0.0  # distance that the law keeps beyond the safe one, between the points that it steers
-    cover_m: float = 0.0  # how far both bodies may be from these points after a period, together
+    cover_m: float = 0.0  # sum of both bodies' distances from these points after a period
     drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
     slip_m: float = 0.0  # how much of its command the robot may miss in a period
-    error_m: float = 0.0  # how far the measured relative position may be off: then the law acts on that one
+    error_m: float = 0.0  # error bound of the measured relative position, on which the law acts
     asynchronous: bool = False  # whether each of two UGVs acts on an old position of the other
     halved: bool = False  # whether one of two robots may stand, so that the pair meets the law with half the gain
-    # For how long from the start on the bodies have to be clear by themselves, since commands given before lead them;
-    # None where their steered points say enough.
+    # Time from the start during which the bodies themselves must be clear, because they follow earlier commands; None
+    # if the steered points suffice.
     start_s: float | None = None
 
     @property

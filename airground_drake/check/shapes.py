@@ -139,7 +139,7 @@ class Shape:
 
     def held_m(self, places: Array, start: Array, end: Array, reach_m: float) -> tuple[Array, Array]:
         """Signed distances of places, and the least on straight steps from `start` to `end`, (K, 3): (K,) each, m."""
-        # Of parts that a step stays more than `reach_m` away from nothing is said.
+        # Parts farther than `reach_m` from a step are ignored.
         at_m, least_m = np.full((2, len(start)), np.inf)
         longest = float(np.linalg.norm(end - start, axis=1).max(initial=0.0))
         for bound, part, rows in self.near(start):

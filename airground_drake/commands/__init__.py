@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse(f"{name!r} is no command: {meant}commands are {', '.join(COMMANDS)}")
     try:
         code: int = import_module(COMMANDS[name].module).main(given[1:])
-    except BrokenPipeError:  # nobody reads what is printed
+    except BrokenPipeError:  # no reader of the output
         raise
     except SimulationError as error:
         return refuse(error, EXIT_TOOL)

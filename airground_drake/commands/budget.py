@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from airground_drake.scenario.budget import PairBudget
     from airground_drake.scenario.schema import Scenario
 
-# Values of a key that is given without any, by its unit; the last entry is for shares.
+# Default values of a varied key, by its unit; the last entry is for shares.
 USUAL = {"_s": (0.0, 0.1, 0.3, 1.0), "_m": (0.0, 0.02, 0.05, 0.1), "": (0.0, 0.1, 0.5)}
-PROMISED, LAW, OLD = "promised_m", "law_m", "old_positions_m"  # what is told of a kind of pair
+PROMISED, LAW, OLD = "promised_m", "law_m", "old_positions_m"  # columns about a kind of pair
 MEANING = "metres, by kind of pair: the distance promised between surfaces -> the distance that the law keeps"
 MEANING_OF_OLD = "; + the way of the other one: nearer than both, two UGVs may only part"
 EXIT_UNDECIDED = 3

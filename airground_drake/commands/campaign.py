@@ -143,7 +143,7 @@ def _summary(result: dict[str, Any], *, looked: bool) -> str:
     for claim in result["claims"]:
         said = f"{claim['refuted']} of {claim['tested']} refuted"
         if not claim["tested"]:
-            said += ", never put to the test"
+            said += ", not tested by any run"
         elif bounds := claim["anytime" if looked else "fixed"]:
             said += f", probability of a violation {bounds[0]:.2g} to {bounds[1]:.2g}"
         differs = f"; {claim['differs']} not as expected" if claim["differs"] else ""

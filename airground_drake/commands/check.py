@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 # Checks that must agree before a report is made again: otherwise the files do not belong to the report.
 NEEDED = ("files", "trace")
 EXIT_UNUSABLE = 2  # exit code of `airground prove` without Coq, or with a report that it cannot read
-# What is taken as recorded: a forger may change it in all its places, unnoticed.
+# Parts that are taken as recorded: a consistent change of these is not detected.
 ALWAYS = (
     "what the scenario asks for and expects; number of seeds; provenance, measured times; "
     "metadata of tables; Coq's version and words; findings of `report audit` that rest on other runs"
 )
-# What is taken as recorded without `--simulate`.
+# Parts that are taken as recorded without `--simulate`.
 NOT_SIMULATED = "policies, seeds and faults; messages and decisions; other seeds, third-party claims, block diagram"
 EPILOG = f"""\
 Each line says what was checked, on which run, and by whom:

@@ -13,7 +13,7 @@ from airground_drake.report.model import Approach, Claim, OnTheWay, Report
 from airground_drake.report.outcomes import named
 from airground_drake.sim.collisions import first_collisions
 
-# What is known of a claim that was not judged.
+# Stands for a claim that was not judged.
 UNJUDGED = Claim(id="", run="", status="not_run", as_expected=None, exercised=None, evidence={}, inputs={})
 
 
@@ -119,7 +119,7 @@ class RunFacts:
     @property
     def contradicts_its_proof(self) -> bool:
         """Whether a distance was broken although a theorem guarantees it and its conditions held."""
-        # Beside what moves, a robot only keeps from bringing itself too near by commands that were not under way.
+        # Beside moving obstacles a robot only guarantees not to come too near by its new commands.
         kept = [breach for breach in self.breaches if breach.second not in self.movers or breach.doing == "robot"]
         return self.is_proved and (bool(kept) or not self.breaches)
 

@@ -36,7 +36,7 @@ NOTHING = "'none'"  # in a content security policy: no source at all
 MAX_DIAGRAM_CHARS = 500_000
 MAX_SCENARIO_CHARS = 20_000
 LINE_CHARS = 110
-# Kinds of evidence shown instead of a passing verdict, so that it does not look like more than it is.
+# Kinds of evidence shown instead of a passing verdict, so as not to overstate it.
 KINDS = ("declared", "stuck")
 MAX_DISTANCE_ROWS = 120
 MAX_INTERVENTIONS = 40  # maximum number of proposals listed per run
@@ -54,7 +54,7 @@ SECTIONS = {
     "claims": "All checks",
     "provenance": "How to run it again",
 }
-# What the first screen calls the sections that it leads to.
+# Names of linked sections on the first screen.
 LINKS = {"claims": "proof", "intervened": "timing, choice", "reproduction": "all numbers"}
 # Sections of the figures; the others are maps of what happened.
 PLACES = {"distances": "safe", "timelines": "intervened"}

@@ -13,8 +13,8 @@ _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 def render(report: Report) -> str:
     # A claim whose status is the expected one passes; it is skipped, with the reason, if not tested.
-    # Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and a claim that
-    # nobody checked are errors.
+    # Otherwise it fails; an `error` is an error and a `not_run` is skipped. A run without a trace and an
+    # unchecked claim are errors.
     name, missing = report.scenario.name, report.overall.missing
     root = ET.Element("testsuites", {"name": _text(f"airground_drake.{name}")})
     runs = list(dict.fromkeys([*report.runs, *(claim.run for claim in report.claims), *(item.run for item in missing)]))

@@ -41,7 +41,7 @@ class Claim(Entry):
     status: Status
     expected: str | None = None
     as_expected: YesNo | None  # none if nothing is expected
-    exercised: Whole | None  # how often it was put to the test; none if that is not counted
+    exercised: Whole | None  # how often it was tested; none if that is not counted
     exercised_by: Words = ""  # what is counted
     subject: Words = ""  # what it is about, in a few words
     statement: Words = ""
@@ -128,7 +128,7 @@ class Stall(Entry):
 
 class Ending(Entry):
     # If the UGV executed it: `over` (its motion was), `given up` (the UGV refused it after all), `replaced`,
-    # `withdrawn`, `released` (nobody was intervened on any more) or `end of the run`; else `refused`, `lost` (never
+    # `withdrawn`, `released` (no intervention any more) or `end of the run`; else `refused`, `lost` (never
     # delivered), `withdrawn first` or `end of the run`.
     how: str
     t_s: Number
@@ -150,7 +150,7 @@ class Messages(Entry):
     proposals: Whole = 0
     withdrawals: Whole = 0
     answers: Whole = 0  # each is a decision of the gatekeeper
-    always_on: dict[str, Whole]  # if every UGV got a proposal, and decided, in every period
+    always_on: dict[str, Whole]  # number if every UGV got a proposal, and decided, in every period
 
 
 class Gatekeeper(Entry):
@@ -241,7 +241,7 @@ class Overall(Entry):
     why: str = ""
     checks: Whole  # claims about which something is expected, and numbers
     as_expected: Whole
-    # Claims by outcome: one that nothing put to the test is counted apart, not under its status.
+    # Claims by outcome; untested claims are counted separately.
     counts: dict[Literal[(*STATUSES, NOT_EXERCISED)], Whole] = {}  # type: ignore[valid-type]
     differs: list[Deviation]  # also numbers that are too small
     undecided: list[Deviation]

@@ -11,18 +11,18 @@ from airground_drake.base.statuses import PASSING
 
 RunFacts = Any  # `facts.RunFacts`, which reads the names of claims here
 
-# Claims about a run: its distances, the conditions of the proof, what the robots did themselves, where they ended.
+# Claims about a run: its distances, the conditions of the proof, the robots' own effect, their ends.
 DISTANCES, CONDITIONS, OWN_DOING, ARRIVAL = registry.DISTANCES, "SAFE-HYP", "SAFE-OWN", registry.ARRIVAL
 # Claims that prove the distances of method (d); the other one joins them for bodies off their steered points.
 PROOFS, PROOF_OF_PLANTS = ("SAFE-INV", "SAFE-GATE"), "SAFE-BUDGET"
-# Claims about the gaps between triggers: that they have a bound, those of a run, and those under finer noise.
+# Claims about the time between triggers: its bound, in a run, and under finer noise.
 DWELL, TRIGGER_GAPS, REFINEMENT = "ZENO-PROOF", "ZENO-TRACE", "ZENO-REFINE"
-# Claims about triggers: that they follow the decision variable, and how they compare with the error without noise.
+# Claims about triggers: against the decision variable, and against the error without noise.
 CROSSINGS, TIMING = "THR-TRIG", "THR-QUALITY"
-# Claims about the threshold: that the one in force is right, that the root of (19) is best, and that (17)-(18) are so.
+# Claims about the threshold: the one in force, the root of (19), and (17)-(18).
 CHOICE, LEAST_RISK, DECISIONS = "THR-CHOICE", "THR-OPT", "THR-DDM"
 PLANS, FOLLOWED = "GATE-PLAN", "LIVE-HYP"  # claims about the gatekeeper's plans, and about following the UAV
-# Where the chart of a claim stands, if that is in a report: a section, or a finding about the paper.
+# Place of a claim's chart: a section, or a finding about the paper.
 CHARTS = {CHOICE: "intervened", REFINEMENT: "audit-9"}
 # Claims in the captions of exported figures, by figure.
 CAPTIONS = {
@@ -46,7 +46,7 @@ class Rule(NamedTuple):
     kept: bool = True
 
 
-# Whether a run was safe. Only a run whose distances pass gets as far as the words "kept" and "proved".
+# Whether a run was safe. "Kept" and "proved" require that its distances pass.
 SAFE = (
     Rule(lambda run: run.collided, "no", "collision", kept=False),
     Rule(lambda run: run.is_broken, "no", "too close", kept=False),
@@ -67,12 +67,12 @@ CAUSES: tuple[tuple[Callable[[RunFacts, str], object], str], ...] = (
     (lambda run, robot: run.refused_all(robot), "refused all proposals"),
 )
 
-# What a run is, by its method, if it sets nothing differently.
+# Description of a run by its method, if it has no settings of its own.
 RUNS = {
     "a": "alone", "b": "obeys the UAV", "c": "accepts by cost", "d": "avoidance first, accepts by outcome",
 }  # fmt: skip
-PRINTED = "priorities as the paper prints them"  # what a run has in place of the package's composition of priorities
-# What a run sets differently, in words.
+PRINTED = "priorities as the paper prints them"  # instead of the package's composition of priorities
+# Settings of a run in words.
 SETTINGS = {
     ("gatekeeper.route", "mixed_integer"): "(26) solved exactly",
     ("gatekeeper.route", "relaxed"): "(27) with half-planes",
@@ -82,11 +82,11 @@ SETTINGS = {
     ("decision.threshold.rule", "printed"): "threshold by (19) as printed",
     ("decision.threshold.rule", "bayes"): "threshold at the Bayes optimum",
 }
-# Where a threshold comes from, by rule.
+# Origin of a threshold, by rule.
 THRESHOLDS = {"fixed": "set by hand", "printed": "by (19) as printed", "bayes": "Bayes optimum"}
 
 OURS = ("robot", "under way")  # values of an encounter's `doing` that are the robots' own
-# What became of a proposal, by whether it was accepted and how it ended; each is in one class.
+# Class of a proposal, by whether it was accepted and how it ended.
 CLASSES: Mapping[tuple[bool, str], str] = {
     (False, "refused"): "refused", (False, "lost"): "never arrived", (True, "given up"): "dropped later",
 }  # fmt: skip

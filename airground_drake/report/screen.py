@@ -18,7 +18,7 @@ from airground_drake.report.sentences import MARKS, Line, counted, grouped, some
 from airground_drake.scenario.schema import Run
 from airground_drake.ugv.reasons import refusal
 
-# Maximum number of endings of UGVs in a cell, of names in a line, and of lines of what not to conclude.
+# Maximum numbers of endings of UGVs in a cell, of names in a line, and of warnings.
 MOST_ENDINGS, MOST_NAMES, MOST_WARNINGS = 4, 2, 3
 
 
@@ -43,8 +43,8 @@ class Row:
     """A row of the table of runs."""
 
     run: str  # its name
-    says: str  # what it is, in words
-    plain: bool  # whether priorities are composed as the package does it; the others are only compared
+    says: str  # its description
+    plain: bool  # whether it uses the package's composition of priorities; other runs are for comparison
     # safe, arrived, uav: its cells.
     safe: Cell = field(default_factory=lambda: Cell("open", ["not run"]))
     arrived: Cell = field(default_factory=lambda: Cell("open", ["not run"]))
@@ -52,7 +52,7 @@ class Row:
     facts: RunFacts | None = None  # none if the scenario names the run, but it was not run
     bad_seeds: int = 0  # other seeds with which a distance was not kept
     kept: bool = False  # whether every distance was kept
-    what: str = "not run"  # how the headline says that it was not
+    what: str = "not run"  # why not, for the headline
 
     @property
     def rank(self) -> tuple[int, bool, int, int]:
@@ -82,9 +82,9 @@ class FirstScreen(NamedTuple):
 
     headline: list[Line]  # one or two lines with the marks of their own runs
     rows: list[Row]  # a row per run
-    within: str  # how far from its target a robot counts as arrived, in words
+    within: str  # the arrival tolerance, in words
     checks: list[Check]  # seeds, triggers, threshold, and the paper
-    beware: list[str]  # what a reader might wrongly conclude: clauses that continue "Do not conclude that"
+    beware: list[str]  # possible wrong conclusions: clauses that continue "Do not conclude that"
     declared: Cell  # whether the verdicts are those that the scenario declares: nothing about safety
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 K = TypeVar("K")
 V = TypeVar("V")
 YES_NO = "yes/no"  # unit of 1 and 0 that stand for an answer
-# Units with which the names of quantities end, and how they are written; the longest first.
+# Units at the ends of names of quantities, and their notation; the longest first.
 UNITS = {
     "1_m2_s": "1/(m²s)", "1_m_s": "1/(m s)", "m_sqrt_s": "m/√s", "m2_s": "m²s", "m_s": "m/s", "1_s": "1/s",
     "1_m": "1/m", "m": "m", "s": "s",

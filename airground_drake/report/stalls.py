@@ -15,15 +15,15 @@ from airground_drake.verify.runs.control_law import Inequalities, inequalities_o
 from airground_drake.verify.runs.pairs import parts_of
 from airground_drake.verify.runs.proposals import proposal_of
 
-PUSH = 1e-3  # a body holds a UGV if it takes more than this share of the UGV's wish to move
-UNEXPLAINED = 0.1  # nobody is said to hold a UGV if more than this share of its wish to move meets no body
+PUSH = 1e-3  # a body holds a UGV if it blocks more than this share of its desired velocity
+UNEXPLAINED = 0.1  # no body holds a UGV if more than this share of its desired velocity is not blocked
 # An inequality binds a standing UGV with less to spare, m/s: a retreat at this speed still counts as standing.
 HELD_M_S = AT_REST_M / AT_REST_S
 
 
 def stalls(trace: Trace) -> list[dict[str, Any]]:
     """Stalls of `AT_REST_S` or longer, by time, before a UGV's first collision."""
-    # Nobody holds a UGV that waits as its proposal asks.
+    # No body holds a UGV that waits as its proposal demands.
     waits = list[dict[str, Any]]()
     for ugv in trace.ugvs:
         if standing := _standing(trace, ugv):

@@ -33,9 +33,9 @@ class PairBudget(NamedTuple):
     radii_m: float  # sum of both radii, m
     law_m: float  # distance that the law keeps between steered points, or a steered point and a core, m
     terms: tuple[Term, ...]  # what it takes beyond the promise and the radii, in the order of their addition
-    start: str = ""  # what the promise asks for where the obstacle appears later than at the start; '' if nothing
+    start: str = ""  # conditions of the promise if the obstacle appears after the start; '' if none
     least_gain: float = 0.0  # least A h with which errors of measured positions cost no more than that
-    # What one of two UGVs that act on old positions reckons with of the other's way, at least, m.
+    # Least uncertainty of the other position for two UGVs that act on old positions, m.
     unsure_m: float = 0.0
 
     @property

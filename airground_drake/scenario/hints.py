@@ -7,7 +7,7 @@ import yaml
 
 LIMITS = 'see "Known limits" in docs/verification.md'
 
-# What keys with such names would be about, and why the model lacks it.
+# Patterns of keys that do not exist, and the reasons.
 NOT_MODELLED = {
     r"accel|decel|jerk|brak": "acceleration limits are not modelled",
     r"mass|inertia|torque|force|friction|slip|grip": "forces are not modelled: robots have the velocities that are "

@@ -25,7 +25,7 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(refuse(f"{message}; see {self.prog} --help"))
 
 
-Option = dict[str, Any]  # what argparse is told of an option or argument
+Option = dict[str, Any]  # argparse's arguments for an option or argument
 
 
 def option(says: str, metavar: str | None = None, kind: Callable[[str], Any] | None = None, **more: Any) -> Option:
@@ -33,7 +33,7 @@ def option(says: str, metavar: str | None = None, kind: Callable[[str], Any] | N
     return {"help": says, **{key: value for key, value in (("metavar", metavar), ("type", kind)) if value}, **more}
 
 
-# By all its names. A command may give another help, or other values.
+# Shared options by all their names. A command may override their entries.
 OPTIONS: dict[str, Option] = {
     "scenario": option("name of a shipped scenario, or path to a YAML file"),
     "folder": option("folder of a report", "DIR", Path),
@@ -62,7 +62,7 @@ def parser_of(
     epilog: str | None = None,
     exclusive: Collection[str] = (),
 ) -> Parser:
-    # takes: its options and arguments, each with what it has otherwise than the table, None if nothing.
+    # takes: its options and arguments, each with overrides of the table's entry, or None.
     # exclusive: options that exclude each other.
     form = argparse.RawDescriptionHelpFormatter if "\n" in (epilog or "") else argparse.HelpFormatter
     parser = Parser(prog=f"airground {name}", description=description, epilog=epilog, formatter_class=form)

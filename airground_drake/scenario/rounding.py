@@ -11,8 +11,8 @@ from airground_drake.base.arrays import ROUNDOFF, Array
 
 TOLERANCE_M = 1e-9  # largest shortfall of a safe distance that reports tolerate, m
 STEPS_PER_PERIOD = 64  # largest number of integration steps in a control period, which events cut; the most seen is 13
-# By so much longer UGVs reckon with any motion of one of which they have an old position, s: for how far rounding takes
-# that one in a period, and them. The law towards old positions restores nothing, so these losses would add up.
+# Additional age of old positions in the asynchronous law, s, for rounding errors of both UGVs in a period: this law
+# does not recover distances, so these losses would add up.
 SPARE_S = 1e-8
 SLACK = 1.01  # factor on the first-order bounds, for products of roundings and for rounding in this formula
 

@@ -74,7 +74,7 @@ def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:
         retry=given.retry_s,
         ranking=given.ranking,  # type: ignore[arg-type]
         budget=given.budget_s,
-        joint=not method.intervention_on_top,  # the paper's UGVs decide each for itself
+        joint=not method.intervention_on_top,  # the paper's UGVs decide individually
     )
     return Planner(
         ugvs=tuple(scenario.ugvs),
@@ -103,7 +103,7 @@ def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:
 
 def _planned_apart(scenario: Scenario) -> tuple[Array, float]:
     """Radii of the UGVs, (n,), and distance between them, m, for plans that keep the law's distances."""
-    # A UGV whose plant takes room is planned for as a larger disc.
+    # A UGV whose plant costs distance is planned as a larger disc.
     more, between = dict.fromkeys(scenario.ugvs, 0.0), 0.0
     budgets = budget(scenario) if takes_room(scenario) else ()
     pairs = [pair for pair in budgets if pair.terms and pair.first in more]

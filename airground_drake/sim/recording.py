@@ -46,7 +46,7 @@ class Done(NamedTuple):
     seed: int
     until_s: float
     wall_s: float  # duration by the clock
-    meta: Mapping[str, Any]  # what only the simulation knows
+    meta: Mapping[str, Any]  # known to the simulation only
     carried: Sequence[tuple[Transit, Sequence[float]]] = ()  # by each link, and when what arrived was read, s
 
 

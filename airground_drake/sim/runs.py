@@ -35,7 +35,7 @@ from airground_drake.uav.guest.process import end_all
 
 FAILURE = "failure.json"
 TOLD_S = 0.2  # period of progress messages, s
-# A run is ended when its simulated time has stood still for so long by the clock, s. Only third-party code can hang:
+# Wall-clock time without progress of the simulated time after which a run is ended, s. Only third-party code can hang:
 # each step of the package has a bound on its work.
 STANDSTILL_S = 600.0
 
@@ -122,7 +122,7 @@ def _simulated(
     compiled, kept_in = _compiled(), kernels.avoid_one.stats.cache_path
     if not compiled:
         progress.stage("compiling, once, about half a minute")
-    if forks():  # what each run would load for itself
+    if forks():  # modules that each run would load itself otherwise
         with processes(1) as another:
             if kept_in and not compiled:
                 another.submit(warm_up_beside)

@@ -71,7 +71,7 @@ class Link:
 
     quality: Quality
     seed: int
-    name: str  # of the link; links of different names have nothing in common
+    name: str  # of the link; links of different names are independent
 
     def carry(self, before: Transit, sent: Sequence[Message], t: float) -> Transit:
         """The state at time t, s, given all messages sent since the beginning."""

@@ -22,13 +22,13 @@ MOST_HALVINGS = 3  # the speed is halved no more often than this
 MOST_PLANS = 4  # largest number of joint plans that are tried for one proposal, each with more UGVs
 # Shares of the clearance, and of the spacing. The next share of the clearance is tried if the UGV has no way even
 # alone, or all joint steps on the roadmaps are exhausted: a gap, or the place where one waits for another, may be too
-# narrow for the full clearance. The next share of the spacing is tried if a joint plan helps nobody: UGVs that have met
-# stand nearer to each other than the full spacing.
+# narrow for the full clearance. The next share of the spacing is tried if a joint plan helps no UGV: UGVs that have met
+# are nearer to each other than the full spacing.
 NARROWER = (1.0, 0.1, 0.01)
 ON_PRESET_M = 0.5  # a motion that ends this near to the preset, m, is predicted to go on along the preset
 BLEND_S = 1.0  # a UGV without a proposal is predicted to approach its preset with this time constant, s
 
-QUICK = Effort(candidates=300_000)  # first effort for a group of UGVs: more UGVs may be what it takes
+QUICK = Effort(candidates=300_000)  # first effort for a group of UGVs: a larger group may be needed
 ONE_BY_ONE = Effort(candidates=0)  # without a search over joint steps, which does not depend on the spacing
 # Why there is no plan, by outcome.
 REASONS: dict[Outcome, str] = {
@@ -47,7 +47,7 @@ class Failures:
 
     # Of UGVs that had no way even alone, by name.
     shut_in: Mapping[str, tuple[Observation, str]] = field(default_factory=dict)
-    # Of groups of UGVs whose plans helped nobody, by their names.
+    # Groups of UGVs, by name, whose plans did not help any UGV.
     in_vain: Mapping[tuple[str, ...], tuple[Observation, str]] = field(default_factory=dict)
 
 
@@ -170,7 +170,7 @@ class Coordinate(Policy):
     ) -> list[int]:
         """Willing UGVs outside the group that are in the way of its triggered UGVs without a way."""
         # A UGV is in the way if it comes near the way that such a UGV would have alone. Without any near one, all
-        # willing UGVs are returned. If no such UGV has a way even alone, nobody can help: the list is empty.
+        # willing UGVs are returned. If no such UGV has a way even alone, no other UGV can help: the list is empty.
         lost = [i for i, way in zip(group, joint_plan.ways, strict=True) if way is None and seen.team[i].triggered]
         ways = [(seen.team[i], way) for i in lost if (way := alone(i)) is not None]
         if not ways:

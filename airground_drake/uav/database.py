@@ -69,7 +69,7 @@ class Asked:
     chosen: bool = False  # whether the plan was sent
     what: str = ""  # what went wrong; empty if nothing did. A failure counts as no intervention.
     traceback: str = ""  # of the failure
-    reason: str = ""  # why it left a UGV without a way, if it says so
+    reason: str = ""  # why it left a UGV without a way, if stated
 
 
 Candidate = tuple[int, Asked, dict[str, Motion]]  # a plan: its turn, the policy that was asked, and motions by UGV

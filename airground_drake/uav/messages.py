@@ -17,7 +17,7 @@ from airground_drake.uav.policy import Proposal
 
 ACCEPT, SILENT, REFUSE, DONE = 1.0, 0.0, -1.0, 2.0
 NOTHING = -1.0  # number of the proposal that a UGV executes if it executes none
-# Reason of a UGV that would come to rest short of its goal with the proposal, no nearer than without.
+# Reason of a UGV that the proposal would bring to rest short of its goal, no nearer than without the proposal.
 STALLS: Literal["stalls"] = "stalls"
 
 Point = tuple[float, float, float]  # a place, m, world frame
@@ -38,7 +38,7 @@ class Report(NamedTuple):
 
     number: int = -1  # of the answer; the answers of all UGVs are counted together; -1: no answer
     sensed: tuple[Outline, ...] = ()  # obstacles at rest that the UGV sensed when it decided
-    reason: str = ""  # why it answers so, see `ugv.answer.Reason`; empty before it has decided
+    reason: str = ""  # reason of the answer, see `ugv.answer.Reason`; empty before it has decided
     words: str = ""  # the reason as a sentence
     seen: tuple[Sighting, ...] = ()  # obstacles that move and that the UGV sensed when it decided
 
@@ -46,7 +46,7 @@ class Report(NamedTuple):
 class Told(NamedTuple):
     """The content of a UGV's answer over a channel."""
 
-    verdict: float = SILENT  # on the proposal that it is about
+    verdict: float = SILENT  # on this proposal
     report: Report = Report()
     newest: int = -1  # the highest number of a proposal that the UGV has read of
     holds: int = -1  # number of the proposal in force; -1: none

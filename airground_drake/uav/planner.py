@@ -35,8 +35,9 @@ from airground_drake.uav.messages import (
 from airground_drake.uav.policy import Answered, MovingObstacle, Observation, Proposal, Teammate
 
 BEHIND_S = 1.0  # a motion has left a UGV behind if from its end the UGV is farther than it could go in this time
-# A motion that begins more than this before its UGV can read of it is planned anew, not repeated, s. A UGV that takes
-# it up late heads for where it is then, through what it leads round; within this time it has not led far.
+# A motion that begins more than this before its UGV can read it is planned anew, not repeated, s. A UGV that starts it
+# late heads straight for its current point, perhaps through an obstacle that it leads round; within this time the
+# motion has not led far.
 LATE_S = 0.5
 _WORDS: dict[float, Answered] = {ACCEPT: "accepted", REFUSE: "refused"}
 
@@ -46,7 +47,7 @@ class Mover(NamedTuple):
 
     name: str  # of the obstacle
     outlines: Array  # of its parts about its origin, (k, W), see `model.geometry.outline`
-    known: bool  # whether the UAV sees it; else it knows what a UGV last reported
+    known: bool  # whether the UAV sees it; else a UGV last reported it
     script: Motion | None  # its way, if predictions know it
 
 
@@ -99,7 +100,7 @@ class Instant(NamedTuple):
     reports: Reports
     standing: Sequence[bool] = ()  # per UGV, whether it stands, see `halts`; default: no UGV stands
     sightings: Sequence[Sighting] = ()  # obstacles that move
-    others: Proposals = ()  # per UGV, what any UAV asks of it; default: there is one UAV
+    others: Proposals = ()  # per UGV, the request in force of any UAV; default: there is one UAV
 
 
 def sent_after(before: PlannerState, after: PlannerState, t: float, sender: Sender) -> PlannerState:
@@ -145,7 +146,7 @@ class Planner:
     trails: tuple[bool, ...] = ()
     sender: Sender = ONLY  # the UAV
     lead: float = 0.0  # time that a proposal is under way, s
-    retry: float = np.inf  # after so long, s, a proposal without an answer is repeated
+    retry: float = np.inf  # a proposal is repeated after this long without an answer, s
     charge: tuple[bool, ...] = ()  # per UGV, whether the UAV is in charge of it; default: of all
     lost_at: float = np.inf  # from this time on the UAV neither sends nor hears anything, s
 
@@ -178,9 +179,9 @@ class Planner:
     ) -> float:
         """Time until which planning changes nothing with the same inputs, s; -inf: it may at once."""
         # Without a proposal in force no answer is read. Then a negotiation changes only when its rest is over, or when
-        # neither its UGV nor its cause is triggered any more. A proposal stays while nobody answers, or with an
+        # neither its UGV nor its cause is triggered any more. A proposal stays without an answer, or after an
         # acceptance that was read. Answers over a channel are not given: what is read there need not be the newest.
-        # Without policies nobody is asked, and nothing else is recorded.
+        # Without policies no policy is asked, and nothing else is recorded.
         if not self.database.policies:
             return math.inf
         called = {name for name, own in zip(self.ugvs, self._own(intervening), strict=True) if own}

@@ -64,7 +64,7 @@ class GatekeeperDecision:
     accept: Outcome | None = None  # outcome of accepting; None if no outcomes were compared
     tries: int = 0  # acceptances since the last rest, with this decision
     answer: int = -1  # number of the answer by which the UAV is told of it; -1: it changes nothing
-    basis: Basis = field(default_factory=Basis)  # what the prediction rested on
+    basis: Basis = field(default_factory=Basis)  # inputs of the prediction
     # CPU time of prediction and decision, s, in which identical runs differ
     cpu_s: float = field(default=0.0, compare=False)
 

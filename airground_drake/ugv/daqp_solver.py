@@ -31,7 +31,7 @@ from pydrake.symbolic import Expression, Variable
 
 from airground_drake.base.arrays import Array, Flags, Indices
 
-# What a program may have. Visualization callbacks are not called.
+# Features that a program may have. Visualization callbacks are not called.
 SUPPORTED = frozenset({
     ProgramAttribute.kLinearCost, ProgramAttribute.kQuadraticCost, ProgramAttribute.kLinearConstraint,
     ProgramAttribute.kLinearEqualityConstraint, ProgramAttribute.kBinaryVariable, ProgramAttribute.kCallback,

@@ -46,15 +46,15 @@ class GatekeeperState(Immutable):
     """The memory of the gatekeepers of n UGVs between samples."""
 
     answers: tuple[float, ...]  # in force, (2n,), see `messages`
-    since: tuple[float, ...]  # when each UGV's answer became what it is, (n,), s
-    reports: Reports  # what each UGV last told the UAV about its proposal
+    since: tuple[float, ...]  # time of each UGV's last change of answer, (n,), s
+    reports: Reports  # each UGV's last message to the UAV about its proposal
     told: int = 0  # answers sent so far
-    desk: Desk | None = None  # what was read and answered over a channel
+    desk: Desk | None = None  # messages read and answered over a channel
     decisions: tuple[GatekeeperDecision, ...] = ()  # those of the last sample with proposals, or of its repetition
     commitments: tuple[Commitment, ...] = ()  # under method (d), each UGV's tries and rests
     # under method (d), which outlines at rest each UGV has sensed and not seen to be gone, (n, m)
     sensed: Flags = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
-    # of these, which are no news when they come into range: the UAV has heard of them, or nothing is asked of the UGV
+    # outlines that need no report when they come into range: the UAV knows them, or the UGV has no proposal
     quiet: Flags = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     # all decisions of the run so far
     made: History[GatekeeperDecision] = field(default_factory=History)

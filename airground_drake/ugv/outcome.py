@@ -122,7 +122,7 @@ def _outcome(
 def way_left(place: Array, goal: Array, rows: Array, distances: Array) -> float:
     """Length of the shortest path to the goal at distances (m,), m, from cores (m, W), m; straight if none exists."""
     # Among cores with more than `MOST_CORNERS` the length is that of a way on a lattice (`distance_field`), a little
-    # longer: no map makes it take long.
+    # longer: no map makes it slow.
     rows, distances = outline.sections(rows, distances, float(place[2]))
     start, end = (np.append(point[:2], 0.0) for point in (place, goal))
     leg = end - start

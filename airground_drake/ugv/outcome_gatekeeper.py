@@ -56,7 +56,7 @@ class OutcomeGatekeepers(Gatekeepers):
 
     def asleep_until(self, proposals: Proposals, before: GatekeeperState) -> float:
         """Until an executed proposal ends, tries are reset, or a known obstacle disappears."""
-        # obstacles that move are news at every sample, unless the UAV sees them
+        # obstacles that move are new at every sample, unless the UAV sees them
         if any(proposals) and self._reported:
             return -math.inf
         until = math.inf
@@ -152,7 +152,7 @@ class OutcomeGatekeepers(Gatekeepers):
         """Judge a new proposal, monitor an accepted one, or keep a refusal."""
         reason: Reason = "kept"
         refuse = accept = None
-        cpu_s = 0.0  # of what is foreseen: to look at the clock takes as long as to keep to an answer
+        cpu_s = 0.0  # of predictions: reading the clock takes as long as keeping an answer
         basis, new = Basis(), self._discovered(known.sensed, before, i, proposal)
         came_too_late = standing == SILENT and now.t >= proposal.motion.end
         if came_too_late or (standing == ACCEPT and self._patience.over(held, now.t)):
@@ -210,7 +210,7 @@ class OutcomeGatekeepers(Gatekeepers):
 
     def _believed(self, position: Array, sensed: Flags, proposal: Proposal) -> Indices:
         """Rows of the UAV's map that are out of a UGV's sight and that it has not sensed itself."""
-        # Only the `MOST_CLAIMED` of these that are nearest count, so that no map makes a decision take long. Rows that
+        # Only the `MOST_CLAIMED` nearest ones count, so that no map makes a decision slow. Rows that
         # are no outlines are left out.
         claimed = proposal.mapped
         apart = np.full(len(claimed), -np.inf)

@@ -14,7 +14,7 @@ OVER: Reason = "over"  # no refusal: the proposal was executed for as long as it
 class Words(NamedTuple):
     """A reason in words."""
 
-    sentence: str  # what the UAV is told
+    sentence: str  # the message to the UAV
     # Why a proposal was refused, in a few words, for a report's first screen; '' if the name of the reason does.
     refused: str = ""
 

@@ -42,7 +42,7 @@ SCREENED = ("SAFE-TRACE", "ZENO-TRACE", "THR-TRIG", "LIVE-GOAL")
 # Two ways to compute a distance of up to 1e3 m differ by 1e-12 m. So a margin is safe beside its limit, -1e-9 m, though
 # robots that slide along an obstacle have margins of 1e-13 m.
 DOUBT_M = 1e-10
-# Margins of both judges differ by less, m or s: the times of events by the isolation, 5e-10 s, a few times over.
+# Margins of both judges differ by less, m or s: times of events differ by a small multiple of the isolation, 5e-10 s.
 SAME = 1e-8
 
 
@@ -137,7 +137,7 @@ class ArrayJudges:
         ways = {robot: Way(log.t, position) for robot, position in places.items()}
         last = np.array([places[ugv][-1] for ugv in self._world.names("ugv")])
         judged = [*conditions(self._given, self._stalls, ways, last)]
-        # A run that fails is judged by the condition that fails most.
+        # The margin of a failed run is that of its most violated condition.
         margin = min(float(condition.entry["margin_m"]) for condition in judged)
         if abs(margin) < DOUBT_M:
             return None

@@ -33,7 +33,7 @@ TIME_TOLERANCE_S = 1e-9
 # A claim may hold with a margin that is this much below 0, in its unit: claims allow for rounding.
 MARGIN_ROUNDING = 1e-6
 
-OWN = "ugv_controller"  # among the inputs of a claim about the package's law: the class that takes the law's place
+OWN = "ugv_controller"  # key in the inputs of a claim about the package's law: the class that replaces the law
 
 
 def unjudged(kind: str) -> Finding:

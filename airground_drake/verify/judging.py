@@ -42,7 +42,7 @@ def judge(trace: Trace, claims: Collection[str] | None = None, progress: Progres
         UnknownNameError: if an identifier is not that of a claim about a run.
         PluginError: if a claim of the scenario cannot be made.
     """
-    chosen, trace = _applicable(trace, claims), replace(trace)  # nothing kept from before: its tables may have changed
+    chosen, trace = _applicable(trace, claims), replace(trace)  # no cached tables: they may have changed
     findings = []
     for claim in chosen:
         with progress.item(f"{claim.id} {trace.meta.get('run')}"):

@@ -18,7 +18,7 @@ KINDS = {"air_ground": "uav_ugv", "ugv": "ugv_ugv", "uav": "uav_uav"}  # by `Sce
 SHARES = {"obstacle": (Fraction(1), Fraction(0)), **dict.fromkeys(KINDS.values(), (Fraction(1, 2),) * 2)}
 MOVING = "moving"  # the kind of a robot beside an obstacle that may move: no theorem keeps its distance
 ASYNCHRONOUS = "asynchronous"  # the kind of two UGVs of which each acts on an old position of the other one
-# The kind of a pair with a body that is not where the law steers it: these theorems are about the steered points.
+# The kind of a pair with a body that is not at its steered point: these theorems are about the steered points.
 STEERED = "steered"
 
 
@@ -67,7 +67,7 @@ def apart(scenario: Scenario) -> Iterator[Apart]:
 class PairKind(NamedTuple):
     """Pairs of one kind with the same distance in the law, m, and closing speed, m/s."""
 
-    # That is the safe distance of a centre from the other's core, and more if a body is not where the law steers it.
+    # That is the safe distance of a centre from the other's core, and more if a body is not at its steered point.
 
     kind: str
     safe_m: Fraction

@@ -174,7 +174,7 @@ def test_the_page_of_a_log_with_gaps_draws_none_of_them(tmp_path: Path, airgroun
     page, replay = ((tmp_path / "judged" / name).read_text() for name in ("judged.html", "replay.html"))
     assert "distances were kept where a body was not recorded" in page
     assert "not 2.400 to 3.600 s" in page
-    assert "Nobody came too near where the log covers it." in page
+    assert "No distance was broken where the log covers it." in page
     assert "not recorded, tb_1, for 1.20 s" in replay
     assert "UGV: own task" not in replay  # a log does not say so
 

@@ -12,8 +12,8 @@ from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry.outline import BASE, CORNERS, COUNT, EXTENT, MIDDLE, TOP
 
-FAR = 1.0 + 1e-12  # squares of distances that exceed a limit by this factor do so whatever the rounding
-PER_CELL = 4.0  # points to a cell, on average, where points near an outline are looked for
+FAR = 1.0 + 1e-12  # squared distances above a limit by this factor exceed it despite rounding
+PER_CELL = 4.0  # average number of points per cell of a search grid
 WIDEST_PIECE = 1.0  # widest piece of an arc that may be covered at once, rad
 FINER = 6  # such pieces are halved at most so often
 

@@ -23,7 +23,7 @@ from airground_drake.model.geometry import convex, outline
 
 MOST_NODES = 60_000  # number of nodes of a lattice; a larger area gets a wider spacing
 FINEST = 0.1  # least spacing as a share of the least distance to keep
-MOST_SQUARES = 6  # number of squares in which a way is looked for, so that no obstacle far away makes it take long
+MOST_SQUARES = 6  # number of search squares, so that distant obstacles do not slow the search
 MOST_FIELDS = 8  # fields that are remembered; each takes 3 MB at most
 ROUNDING_M = 1e-9
 
@@ -32,8 +32,8 @@ ROUNDING_M = 1e-9
 class DistanceField:
     """Paths to one goal that keep distances from obstacles in the plane z = 0."""
 
-    # The nodes keep at least 0.71 of their spacing from all cores, so no way leads through a thin wall. In exchange, a
-    # gap may be closed that is narrower than that.
+    # The nodes keep at least 0.71 of their spacing from all cores, so no path crosses a thin wall, but gaps narrower
+    # than that may be closed.
 
     rows: Array  # outlines of the obstacles, (m, W), see `convex`
     keep: Array  # distances from their cores, (m,), m
@@ -44,7 +44,7 @@ class DistanceField:
     @classmethod
     def to(cls, goal: Array, rows: Array, keep: Array, half: float) -> DistanceField:
         """The field of a goal in a square about it; `goal` (2,), m; `rows` (m, W); `keep` (m,), m; `half` in m."""
-        # If the goal is too near to an obstacle, the nearest free nodes see it all the same.
+        # If the goal is too near to an obstacle, the nearest free nodes still see it.
         low, high = outline.box(rows)
         room = float(keep.max())
         low = np.maximum(np.minimum(low[:2], goal) - room, goal - half)

@@ -7,7 +7,7 @@ from airground_drake.base.compiling import njit
 from airground_drake.model.geometry.convex import approach, nearest
 from airground_drake.model.geometry.outline import BASE, CORNERS, COUNT, TOP
 
-COARSE = 16  # every so many places are looked at first: what is least there lets most others be passed over
+COARSE = 16  # stride of the first pass, whose least distance lets most other points be skipped
 
 
 @njit(cache=True)

@@ -41,11 +41,11 @@ _EPS = TOL / 10
 
 FEW = 64  # up to this number of circles all obstacles enter the graph; beyond it only those that a path runs into
 
-SEARCHES = 12  # after so many searches more obstacles enter the graph than the path runs into: a quarter as many again
+SEARCHES = 12  # after this many searches, a quarter more obstacles enter the graph than the path runs into
 
 AT_ONCE = 1_000_000  # largest number of pairs of a segment and a disc that are tested together, to limit memory
 
-SLACK = 1e-3  # by so much more than the arc round a corner has to be covered at both ends, rad
+SLACK = 1e-3  # additional angle at both ends of a corner's arc that must be covered, rad
 
 # Largest angle of the chords that stand for an arc where obstacles are looked for that a path runs into, rad.
 CHORD = 0.1
@@ -424,7 +424,7 @@ def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
         if not new.any():
             return route
         some, searches = some | new, searches + 1
-        if searches >= SEARCHES:  # it feels its way along a wall of many parts: more of them at once, one from a cell
+        if searches >= SEARCHES:  # along a wall of many parts: add several at once, one per cell
             middles = around.rows[:, MIDDLE:EXTENT]
             apart, _ = cKDTree(middles[new]).query(middles)
             apart[np.isin(around.cells, around.cells[some])] = np.inf

@@ -159,7 +159,7 @@ def _augmented(lower: Array, normal: Array, bound: Array) -> Array:
     velocity = _scale_back(velocity, normal, bound)
     if _dot(velocity, velocity) >= 1e-6 * speed or speed < CONTRADICTION_M_S:
         return velocity
-    # between two bodies that it touches no margin fits: the exact bounds, which let it slide along
+    # between two touching bodies the margins leave no room: use the exact bounds, which let it slide along
     touched = bound.copy()
     for k in range(len(bound)):
         if bound[k] <= CONTRADICTION_M_S:
@@ -278,9 +278,10 @@ def _closest_feasible(lower: Array, normal: Array, bound: Array) -> Array:
 @njit(cache=True)
 def _least_violation(normal: Array, bound: Array) -> Array:
     """Slowest velocity with the least maximum violation, up to `ABOVE_LEAST` and `ABOVE_LEAST_M_S`."""
-    # Constraints contradict each other only where a robot is inside several safe distances at once. The wishes of lower
-    # priorities then have no say: they might be hostile. The least violation is found from below: each contradiction
-    # proves that every velocity misses some constraint by a certain amount, and the bounds are lowered by that.
+    # Constraints contradict each other only where a robot is inside several safe distances at once. Lower
+    # priorities then have no influence: they might be hostile. The least violation is found from below: each
+    # contradiction proves that every velocity misses some constraint by a certain amount, and the bounds are lowered
+    # by that amount.
     still = np.zeros(normal.shape[1])
     least, more = 0.0, np.inf
     while more > 1e-14 * least:

@@ -26,8 +26,8 @@ from airground_drake.model.plants.steering import EDGES, NUMBERS, keep_ahead
 class AcceptedMotion(NamedTuple):
     """The demand of an accepted intervention on one UGV now, (12)-(13)."""
 
-    wanted: Array  # where it is to be, (3,), m, world frame
-    rate: Array  # velocity of that place, (3,), m/s
+    wanted: Array  # desired position, (3,), m, world frame
+    rate: Array  # its velocity, (3,), m/s
     chosen: Array  # J_int^+ J_int, projector onto the directions in which the UAV intervenes, (3, 3)
 
 

@@ -38,9 +38,9 @@ class Own(Plant):
     """A Drake System of the user's."""
 
     # `sim.blocks.plant` makes it and looks at its ports.
-    # Its steered point gets to within `drift_m_s` times the control period of where its command leads in each period,
+    # In each period its steered point ends within `drift_m_s` times the control period of the commanded point,
     # and its body stays within `cover_m` of the straight line between the places of that point at the period's ends. A
-    # run measures both. Predictions go where the command leads.
+    # run measures both. Predictions assume that commands are followed exactly.
 
     name: str  # of its class, `module:Class` or `file.py:Class`
     drift_m_s: float  # declared

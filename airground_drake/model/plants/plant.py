@@ -22,7 +22,7 @@ import numpy as np
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.model.plants.budget import Bounds
 
-# Signals of a body that is not where the law steers it: its position, world frame.
+# Signals of a body off its steered point: its position, world frame.
 PLACE = ("body_x_m", "body_y_m", "body_z_m")
 HEADING = "heading_rad"  # the signal of a body that has one
 
@@ -43,7 +43,7 @@ class Keys:
     kind: str  # its name; it chooses among the classes
     is_own: ClassVar[bool] = False  # whether it is a class of the user's
     may_be_late: ClassVar[bool] = False  # whether it may follow a delay in a list
-    alone: ClassVar[str] = ""  # why it combines with no other plant, if there is more to say than that no theorem does
+    alone: ClassVar[str] = ""  # why it combines with no other plant, if not only for lack of a theorem
 
     def made(self, period_s: float, after: Plant | None) -> Plant:
         """The plant, with a control period, s; `after` gets its commands, if it may precede one."""
@@ -92,13 +92,13 @@ class Need(NamedTuple):
 class Plant:
     """The motion of a robot, period by period. This base class follows commands exactly."""
 
-    # Names of what a run measures of it in each control period, in the samples: then its motion is not known here.
+    # Names of the quantities that a run measures in each control period (for plants with unknown motion).
     measured: ClassVar[tuple[str, ...]] = ()
-    # Key of a scenario that its cover comes from.
+    # The scenario's key of its cover.
     cover_key: ClassVar[str] = "cover_m"
     # Theorems about it beside an obstacle that may move.
     passive_theorems: ClassVar[tuple[str, ...]] = ()
-    # Why no theorem is about a recorded run with it; '' where one is (`verify/proofs/export.py` knows its bounds).
+    # Why no theorem covers a recorded run with it; '' if one does (`verify/proofs/export.py` has its bounds).
     unproved: ClassVar[str] = "no theorem is about such a body"
 
     @property

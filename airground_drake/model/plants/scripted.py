@@ -10,5 +10,5 @@ from airground_drake.model.plants.plant import Plant
 class Scripted(Plant):
     """Nobody commands it."""
 
-    script: Motion  # where it is, straight between its vertices, which are at control samples
-    announced: bool = False  # whether the robots' predictions know that
+    script: Motion  # its motion, straight between vertices at control samples
+    announced: bool = False  # whether the robots' predictions use it

@@ -29,7 +29,7 @@ class Corners(NamedTuple):
     """Corners of the references of n UGVs: the vertices of their presets."""
 
     times: Array  # of all vertices, in order, (C,), s
-    ugvs: npt.NDArray[np.int64]  # whose they are, (C,)
+    ugvs: npt.NDArray[np.int64]  # the UGV of each, (C,)
     first: npt.NDArray[np.int64]  # rows of each UGV's own vertices: from `first[j]` to before `first[j + 1]`, (n + 1,)
     own_times: Array  # their times, (C,), s
     places: Array  # and places, (C, 3), m

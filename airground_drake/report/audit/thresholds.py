@@ -18,7 +18,7 @@ DRIFT, NOISE, C1, C2 = 1.0, 1.0, 0.5, 1.0  # a textbook case with the paper's c1
 # What the paper's table says about the threshold. The table gives no drift: we assume the one for which its zeta is
 # optimal.
 TABLE_1 = Threshold(rule="fixed", zeta_m=3.0, c1_1_s=C1, c2=C2, drift_m_s=6.05, noise_m_sqrt_s=10.0)
-ASSUMED = "Table 1, drift assumed"  # how item 18 calls these numbers
+ASSUMED = "Table 1, drift assumed"  # names of these numbers in item 18
 REPORTED_TRIGGER_S = 14.45  # when the paper's case A triggers
 
 

@@ -34,7 +34,7 @@ OPENING_DEG, MARGIN_DEG = 46.0, 7.0
 
 def served() -> Meshcat:
     """A new Meshcat, which listens on a port of this machine as long as it exists."""
-    logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat logs its address, which nobody needs for a file
+    logging.getLogger("drake").setLevel(logging.WARNING)  # suppress Meshcat's log of its address, irrelevant for a file
     try:
         return Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
     except RuntimeError as error:

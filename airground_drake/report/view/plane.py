@@ -26,7 +26,7 @@ THUMBNAIL_IN = (2.5, 1.9)  # width and height of a small picture, inches
 MAX_THUMBNAIL_UGVS, MAX_THUMBNAIL_POINTS = 20, 200
 # Least size of the wedge of a robot with a heading, as a share of the picture, and number of wedges on its way.
 WEDGE, WEDGES = 0.008, 9
-MOST_OBLONG = 12.0  # a map is at most so much longer than wide: labels have no place beside a line
+MOST_OBLONG = 12.0  # largest ratio of a map's sides, so that labels have room
 # Margin left of a map, both side margins together, margins below and above it, inches.
 _LEFT_IN, _BESIDE_IN, _BELOW_IN, _ABOVE_IN = 0.5, 0.65, 0.42, 0.1
 _VOID_DASH, _WAY_DOTS = (0, (1.5, 2.5)), (0, (1.0, 1.5))

@@ -15,7 +15,7 @@ MOST_ELEMENTS = 1_000_000
 TILTED = 1e-6  # roll or pitch above which something does not stand upright, rad
 SHAPES = ("box", "cylinder", "sphere")
 EMPTY = "empty"  # the geometry of nothing
-# Elements that are in nobody's way, by the element around them. Other elements are read, or named as left out.
+# Elements that are no obstacles, by their parent element. Other elements are read, or named as left out.
 NO_BODIES = {
     "sdf": {"light"},
     "world": {

@@ -33,9 +33,9 @@ from airground_drake.uav.halts import watched
 
 Ints = npt.NDArray[np.int64]
 
-# What is due at a tick, as bits.
+# The updates due at a tick, as bits.
 CONTROL, PLAN, GATE, NOISE = 1, 2, 4, 8
-WATCH = 16  # what is around changes
+WATCH = 16  # the surroundings change
 # Why the loop stops: the end; an update for Python; no room for another row; as in Drake, an error.
 DONE, PYTHON, FULL, NOT_A_NUMBER, SHORT_STEPS, NOT_FINITE = 0, 1, 2, 3, 4, 5
 # How it is entered: at the beginning of a run, to go on with it, or to publish a row for which there was no room.
@@ -64,7 +64,7 @@ class Team(NamedTuple):
     due: Ints  # what is due then
     draws: Array  # the noise, (.., n)
     gated: bool  # whether UGVs judge proposals
-    remembers: bool  # whether what they sense may be news
+    remembers: bool  # whether UGVs may sense something new
 
 
 class Around(NamedTuple):
@@ -107,7 +107,7 @@ class State(NamedTuple):
     begun: Array  # signals of the decision block when its step began, (1 + 5n,)
     now: Array  # and now
     reference: Array  # (6n,)
-    quiet: Flags  # what is no news to each UGV, (n, m)
+    quiet: Flags  # outlines that are known to each UGV, (n, m)
 
 
 class Log(NamedTuple):

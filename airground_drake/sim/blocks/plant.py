@@ -200,7 +200,7 @@ def code_of(name: str, make: Callable[..., System]) -> OwnCode:
     return OwnCode(name, next(iter(functions), make))
 
 
-GROUND_M = 1e-6  # by so much a UGV's plant may be off the ground, by rounding, m: walls have no end in height for UGVs
+GROUND_M = 1e-6  # rounding tolerance of a UGV's height, m
 
 
 class OwnBody(LeafSystem):

@@ -85,7 +85,7 @@ def declare_inbox(
     system: Any, count: int, state: set[Any], held: Callable[[Any, Context], Any], *, now: bool = False
 ) -> InputPort:
     """Declare the ports of UGVs with a channel: in `inbox`; out `proposals` (those held) and `outbox`."""
-    # now: whether what has just arrived is answered before the state is updated
+    # now: whether messages that have just arrived are answered before the state is updated
     inbox = system.DeclareAbstractInputPort("inbox", Value(()))
     needs = {*state, inbox.ticket()}
     declare_output(system, "proposals", no_proposals(count), held, needs)

@@ -14,7 +14,7 @@ from airground_drake.model.geometry import convex, outline
 from airground_drake.scenario.schema import Obstacle
 from airground_drake.scenario.shapes import convex_parts
 
-TRIES = 10_000  # places that are tried before a field counts as full
+TRIES = 10_000  # attempts to place an obstacle before a field counts as full
 MOST_OBSTACLES = 10_000
 BEYOND_M = 0.3  # margin of starts and targets beyond the safe distance, m
 LEAST_M, MOST_M = 1e-3, 1e3  # smallest and largest size of walls and boxes, m

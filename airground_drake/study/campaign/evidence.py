@@ -22,8 +22,8 @@ WORST = 5  # runs of least margin that are listed for each claim
 BINS = 4  # parts of a key in maps of where a claim fails: quarters of its draws
 MOST_VALUES = 12  # most values of a key that is not a number, such as lists of policies, in these maps
 MOST_LISTED = 50  # runs that are listed at most; the dataset has them all
-UNRELATED = "seed"  # a key that explains no failure: neighbouring seeds of the noise have nothing in common
-BY_CHANCE = 0.05  # a map is shown if chance alone makes such differences with less than this probability
+UNRELATED = "seed"  # a key that cannot explain a failure: neighbouring seeds of the noise are unrelated
+BY_CHANCE = 0.05  # significance level: a map is shown if its differences have a p-value below this
 QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 
 Json = dict[str, Any]

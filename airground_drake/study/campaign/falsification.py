@@ -23,7 +23,7 @@ from airground_drake.study.campaign.spec import Spec
 from airground_drake.study.campaign.work import rows_at, rows_of_scenario
 
 FAILED = -1.0  # value of a violation that has no margin
-LATEST_S = 1e9  # time of an arrival that never happens, s; infinity would mean that nothing was measured
+LATEST_S = 1e9  # time of an arrival that never happens, s; infinity would mean "not measured"
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Search:
     spec: Spec  # of the scenarios; a course is that of draw 0
     objective: Objective  # is minimised
     limits: Limits  # largest scenario and longest time
-    engine: Engine = "batch"  # who makes the runs
+    engine: Engine = "batch"  # simulator of the runs
 
     def values(self, point: Array) -> dict[str, Any]:
         """By dotted key, at a point of the unit cube."""
@@ -108,7 +108,7 @@ class Best:
 
 def falsify(search: Search, sampler: Sampler, number: int, pool: Pool, progress: Progress = SILENT) -> Best:
     """Try points until there is a counterexample, or `number` of them were tried."""
-    # number: largest number of points; the last batch of the sampler is cut, and the sampler is not told of it.
+    # number: largest number of points; the last batch of the sampler is cut without informing the sampler.
     best = Best(0, np.inf, np.empty(0), False)
     while best.tried < number and not best.found:
         asked = _asked(sampler, dimensions(search.spec.drawn))

@@ -15,8 +15,8 @@ from airground_drake.base.errors import AirgroundError
 from airground_drake.base.parallel import processes
 
 DEATHS = 2  # an item is given up after this many of its processes have died
-AHEAD = 4  # items for each process that are handed out in advance; on a cluster, tasks
-TASK_S = 1.0  # what a task on a cluster should take, s: each costs Dask milliseconds
+AHEAD = 4  # number of items (on a cluster: tasks) handed out to each process in advance
+TASK_S = 1.0  # intended duration of a task on a cluster, s: each task costs Dask milliseconds
 
 T = TypeVar("T")
 

@@ -7,11 +7,12 @@ from airground_drake.base.statuses import NOT_EXERCISED, outcome
 # Columns of the dataset and their types; a number that does not exist is NaN.
 #
 # `ended` is `judged`, or the reason why not, explained in `what`: `invalid` (no valid scenario), `stopped` (the
-# simulation), `died` (its process). Such a row has no claim, and neither has the row of a run without claims. Of a
-# claim `what` is the hypothesis that the run broke first, who did so, and when. `drawn` is strict JSON: values by key.
-# `engine` is who made a run: the compiled loop, Drake, or both, bit by bit the same; or the loop, not compared, because
-# a policy met its limit of time by the clock. A run of the loop that is only `screened` was judged by array judges, all
-# others by the judge of traces. `digest` is the digest of all rows of a draw (see `store`).
+# simulation), `died` (its process). Such a row has no claim, and neither has the row of a run without claims. In the
+# row of a claim, `what` is the hypothesis that the run broke first, the robot that broke it, and the time. `drawn` is
+# strict JSON: values by key. `engine` is the simulator of a run: the compiled loop, Drake, or both with bitwise equal
+# results; or the loop without comparison, because a policy exceeded its wall-clock limit. A run of the loop that is
+# only `screened` was judged by array judges, all others by the judge of traces. `digest` is the digest of all rows of a
+# draw (see `store`).
 COLUMNS: dict[str, str] = {
     "index": "int64", "run": "str", "method": "str", "ended": "str", "what": "str", "claim": "str", "status": "str",
     "as_expected": "bool", "margin": "float64", "unit": "str", "exercised": "float64", "ugvs": "int64",

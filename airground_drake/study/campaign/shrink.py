@@ -11,7 +11,7 @@ from typing import Any
 
 # Lists and mappings whose entries may be left out.
 PARTS = (("intervention", "policies"), ("ugvs",), ("uav", "phantoms_m"), ("uavs",), ("obstacles",))
-SHARES = (0.25, 0.5, 0.75, 0.9)  # shares of the duration that may be left
+SHARES = (0.25, 0.5, 0.75, 0.9)  # shares to which the duration may be shortened
 DIGITS = (0, 1, 2, 3)  # decimals that numbers are rounded to, the fewest first
 # Keys with numbers that are rounded.
 ROUNDED = ("ugvs", "obstacles", "arena_m", "uav", "uavs", "control", "decision", "duration_s")

@@ -218,7 +218,7 @@ def _check_overrides(spec: Spec, document: Document) -> None:
     try:
         spec.draw(0)
     except ScenarioError as error:
-        if error.value == UNKNOWN_KEY:  # no draw would be valid; other faults may be of this draw only
+        if error.value == UNKNOWN_KEY:  # no draw would be valid; other faults may concern this draw only
             raise _placed(error, document, "draw") from None
 
 

@@ -49,7 +49,7 @@ class Store:
             self._journal = files.open_regular(folder / JOURNAL, os.O_RDWR | os.O_CREAT | os.O_APPEND)
         try:
             fcntl.flock(self._journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if (folder / MANIFEST).exists():  # another command's, if the folder was empty a moment ago
+            if (folder / MANIFEST).exists():  # another command created it if the folder was empty a moment ago
                 _be_the_same(folder, manifest)
         except (BlockingIOError, FolderError) as error:
             os.close(self._journal)

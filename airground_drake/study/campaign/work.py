@@ -40,7 +40,7 @@ from airground_drake.verify import Verdict, array_judges, judge
 from airground_drake.verify.array_judges import SAME, ArrayJudges, NoScreenError, triggers
 from airground_drake.verify.registry import run_claims
 
-SHARE = 0.005  # of the runs that the loop made and nothing is wrong with, which Drake makes again
+SHARE = 0.005  # share of the loop's faultless runs that Drake repeats
 
 
 class DrawOutOfTime(BaseException):
@@ -150,7 +150,7 @@ def _judged(scenario: Scenario, run: str, claims: Collection[str], index: int, e
     except LeftToDrakeError:
         trace = simulate(scenario, run)
         return _Judged(judge(trace, claims=claims or None), happened_in(trace), DRAKE)
-    # A policy's limit is in time by the clock, and need not fall at the same plan in Drake's run.
+    # A policy's limit is wall-clock time, so Drake's run may exceed it at another plan.
     clock = any(OutOfTime.__name__ in asking.what for asking in made.memory.asked)
     screens = screened(loop, made, claims)
     chosen = _is_chosen(index, run)
@@ -172,8 +172,8 @@ def _is_chosen(index: int, run: str) -> bool:
 
 def _is_failure(verdict: Verdict) -> bool:
     """Whether Drake repeats a run because of an undeclared failure."""
-    # A narrow margin is no reason. Array judges leave what they cannot tell to the judge of traces, whose verdicts are
-    # about traces that are Drake's to the bit.
+    # A narrow margin is no reason: what array judges cannot decide, the judge of traces decides, on traces that equal
+    # Drake's bit by bit.
     return verdict.status not in (*PASSING, "not_run") and verdict.as_expected is False
 
 

@@ -21,7 +21,7 @@ from airground_drake.uav.policy import Observation
 
 AGENT = "agent"  # name of the policy that asks the agent of an environment
 SETTLED_S = 1.0  # a run ends early when all robots have been at their targets for this long, s
-ROUNDING = 1e-12  # relative difference by which an instant may miss the end of a run through rounding
+ROUNDING = 1e-12  # relative rounding error of an instant at the end of a run
 
 
 def with_agent(scenario: Scenario, run: str) -> Scenario:
@@ -107,7 +107,7 @@ class Episode:
         self.stage = stage
         self.seed = stage.scenario.seed if seed is None else seed
         self.ended = False
-        self.away_s = dict.fromkeys(stage.ugvs, 0.0)  # time away from the target, at planning instants
+        self.away_s = dict.fromkeys(stage.ugvs, 0.0)  # time away from the target, counted at planning instants
         self._chosen: dict[str, Proposed] = {}
         self._requests: dict[str, Observation] = {}
         self._run = stage.begin(self.seed)

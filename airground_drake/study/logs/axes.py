@@ -14,15 +14,15 @@ from airground_drake.study.logs.stream import PER_M, Stream
 
 # Axes of a log along x, y and z of the scenario: as they are; and of one with x north, y east, z down.
 PLAIN, NED = "x,y,z", "y,x,-z"
-# Axes that other programs have.
+# Axes that other programs use.
 OTHERS = {
     NED: "x is north, y east and z down", "x,-y,-z": "z is down", "x,-z,y": "y is up", "z,x,y": "y is up",
     "-x,z,y": "y is up", "-z,-x,y": "y is up", "x,z,y": "y is up, as in Unity",
 }  # fmt: skip
-# A body begins where the scenario has it if it is so near; starts so far from (0, 0) tell axes apart, m.
+# A body starts at its start in the scenario if it is this near; starts this far from (0, 0) distinguish axes, m.
 NEAR_M, APART_M = 0.1, 0.5
-LEVEL_M, WIDE_M = 0.1, 0.5  # heights of what drives on the ground vary by less, and its ways are wider, m
-BELOW_M = 0.2  # what flies is below the ground if it is lower than this, m
+LEVEL_M, WIDE_M = 0.1, 0.5  # heights of ground vehicles vary by less than this, and their horizontal motion is wider, m
+BELOW_M = 0.2  # an aircraft lower than this is below the ground, m
 # In names of files, topics and frames: the axes of PX4 and MAVLink.
 _IS_NED = re.compile(r"(?<![a-z])ned(?![a-z])|vehicle_local_position", re.IGNORECASE)
 

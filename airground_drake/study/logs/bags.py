@@ -23,7 +23,7 @@ MCAP = b"\x89MCAP0\r\n"  # how an MCAP file begins and ends
 # How a ROS 1 bag, the file of a ROS 2 bag, and what zstd has packed begin.
 ROS1, SQLITE, ZSTD = b"#ROSBAG V2.0", b"SQLite format 3\0", b"\x28\xb5\x2f\xfd"
 LONGEST_MESSAGE = 50_000_000  # bytes of a message that is decoded
-DENSEST = 20  # all parts of a file may unpack to so many times its size, if that is more than `files.MOST_UNPACKED`
+DENSEST = 20  # all parts of a file may unpack to this multiple of its size, if that is more than `files.MOST_UNPACKED`
 BLOCK = 1_000_000  # bytes that are unpacked at once
 Decode = Callable[[bytes], Any]
 

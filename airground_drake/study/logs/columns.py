@@ -18,7 +18,7 @@ WORDS = {
     "usec": "us", "microseconds": "us", "\u00b5s": "us", "\u03bcs": "us", "nsec": "ns", "nanosec": "ns",
     "nanoseconds": "ns",
 }  # fmt: skip
-# Names of a column that says whose row it is.
+# Names of a column with the name of each row's body.
 BODIES = (
     "body", "robot", "robot_name", "robot_id", "name", "agent", "agent_id", "vehicle", "model", "model_name", "object",
     "entity", "id", "label", "child_frame_id", "namespace", "who",
@@ -31,17 +31,17 @@ STAMPS = (
 )  # fmt: skip
 # Names of a column with the times at which messages were received.
 RECEIPT = ("%time", "receive_time", "received", "recv_time", "log_time", "receipt", "rosbagtimestamp")
-# Names of a column with the numbers of frames, which are no times.
+# Names of a column with frame numbers, which are not times.
 COUNTERS = (
     "frame", "frames", "frame_id", "frameid", "frame_number", "framenumber", "frame_no", "frame_nr", "frame_num",
     "frame_index", "frame_idx", "step", "tick", "sample",
 )  # fmt: skip
-TARGETS = ("t", "body", "frame", "x", "y", "z")  # what `--map-columns` can give a name to
+TARGETS = ("t", "body", "frame", "x", "y", "z")  # targets of `--map-columns`
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 _SUFFIX = re.compile(r"(.+?)\s*[_/]\s*(mm|cm|m|s|ms|us|ns|secs?|seconds|msec|usec|nsec)", re.IGNORECASE)
 _AXIS = re.compile(r"(?:(.*?)[/._\s:|-])?(?:(?:t|p|pos|position|pose|translation)_?)?([xyz])", re.IGNORECASE)
 _AXIS_FIRST = re.compile(r"(?:pos_?)?([xyz])[/._\s-](.+)", re.IGNORECASE)
-# Last words of names of places, but for those of bodies; '' is that of plain x and y.
+# Last words of the names of position columns, without names of bodies; '' is for plain x and y.
 _POSITIONS = ("", "p", "pos", "position", "pose", "place", "point", "location", "translation", "xyz")
 _WHOLE = re.compile(r"(.*?)[/._]?(?:secs?|seconds)", re.IGNORECASE)
 _REST = ["nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"]
@@ -98,8 +98,8 @@ class Columns(NamedTuple):
 
 
 def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection[str]) -> Columns:
-    # chosen: names of columns by what they are, see `TARGETS`, with `{body}` for the name of a body; a unit may follow
-    # what they are: `x_mm`.
+    # chosen: names of columns by their content, see `TARGETS`, with `{body}` for the name of a body; a unit may follow
+    # the content: `x_mm`.
     labels, mapped = _mapped(labels, chosen)
     given = {split_unit(target)[0] for target, name in chosen.items() if "{body}" not in name}
     axes: dict[str, dict[str, tuple[int, str]]] = {}

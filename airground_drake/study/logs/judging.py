@@ -38,9 +38,9 @@ from airground_drake.study.logs.tracks import Span, Track, Tracks, height_m
 
 # Whether a distance was kept where the log covers it; open: the position error decides.
 KEPT, BROKEN, OPEN = "kept", "NOT KEPT", "open"
-LAST_S = 1.0  # who approached whom is told of this time before the least distance, s
-STEPS = 100  # parts of that time, in which the two motions are told apart
-STAMP_S = 2e-9  # the time between two stamps is known to this
+LAST_S = 1.0  # time before the least distance over which approaches are attributed to bodies, s
+STEPS = 100  # number of parts of that time in which both motions are separated
+STAMP_S = 2e-9  # accuracy of the time between two stamps
 HALVINGS = 60  # halvings of an interval in the search for a time
 # Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this.
 MOST_SPARE = 0.05
@@ -61,26 +61,27 @@ class JudgedPair(NamedTuple):
     first: str  # a robot
     second: str  # an obstacle, or another robot
     safe_m: float  # distance to be kept
-    least_m: float  # least distance of the positions in the log, at all times that are covered
+    least_m: float  # least distance of the positions in the log, over all covered times
     at_s: float  # when
-    error_m: float  # sum of both position errors: true distances differ from those of the log by no more
+    error_m: float  # sum of both position errors: true distances differ from the log's by no more
     below_s: list[Span]  # stretches in which the log's distance is below `safe_m`
     covered_s: float  # time for which both were recorded
-    gaps_s: list[Span]  # stretches within the log in which one of them was not
+    gaps_s: list[Span]  # stretches within the log in which one of them was not recorded
     intervals: int  # number of intervals in which the law was judged
-    lacking: int  # number of those in which it lacks something
-    missed_m: float  # e, the most that it lacks in an interval, m
+    lacking: int  # number of intervals that violate it
+    missed_m: float  # e, the largest violation in an interval, m
     missed_at_s: float  # when that interval begins
     missed_for_s: float  # its length
-    missed_by_m: dict[str, float]  # what each robot lacks of its share in that interval, m
+    missed_by_m: dict[str, float]  # each robot's violation of its share in that interval, m
     # Least distance at the beginning of a stretch: of the log, after a gap, or when an obstacle appears.
     starts_m: float
     starts_s: float  # when that stretch begins
-    theorem: str  # "Safety" or, beside what may move, "Passive", which promises that a robot does nothing wrong itself
+    # "Safety" or, beside a moving obstacle, "Passive": it guarantees that the robot itself does not break the distance.
+    theorem: str
     too_fast_m_s: float  # largest speed of an obstacle above the declared one; 0 if it kept that
     # Distance of the true bodies that follows from the theorem; None if not above 0, or for Passive.
     promised_m: float | None
-    # Distance that a law on positions so wrong has to keep, so that the true bodies keep `safe_m`: the theorem of the
+    # Distance that a law must keep with such position errors so that the true bodies keep `safe_m`: the theorem of the
     # distance budget, eps + sqrt(d^2 + eps^2) between centres, for A h = 1.
     law_m: float
     came_m: dict[str, float]  # by how much each came nearer to the other in the last second before the least distance
@@ -118,11 +119,11 @@ class Judged(NamedTuple):
     begin_s: float  # first time in the log
     end_s: float  # last one
     duration_s: float  # of the scenario
-    longest_s: float  # longest interval in which motion was taken as straight
+    longest_s: float  # longest interval with interpolated motion
     usual_s: float  # longest of the bodies' usual times between two samples
     stray_m: float  # how far a robot can be from that straight line at its speed limit
     speeds_m_s: dict[str, tuple[float, float]]  # largest speed of each robot in the log, and its limit
-    away_m: dict[str, float]  # how far each robot starts from where the scenario has it
+    away_m: dict[str, float]  # distance of each robot's start from its start in the scenario
     not_judged: tuple[str, ...]
 
     @property
@@ -364,7 +365,7 @@ def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
     there, passes = shape.within(apart, need_m)
     below_s: list[Span] = []
     for k in np.flatnonzero(passes).tolist():
-        # Only where it is not below at an end, a step has a lowest place and a time at which it comes to be below.
+        # A step that is not below at an end has a lowest point, and a time at which it falls below.
         lowest = 0.0 if there[k] and there[k + 1] else _lowest(shape, apart[k], apart[k + 1])
 
         def crossing(above: float, k: int = k, below: float = lowest) -> float:
@@ -423,7 +424,7 @@ def _speed(track: Track) -> float:
 
 def _moved(track: Track) -> tuple[Array, Array]:
     """Displacements from each sample to a later one, m, and the time between them, s; not across gaps."""
-    # That is half the usual time at least: of samples that are nanoseconds apart, rounding makes up any speed.
+    # That is at least half the usual time: with samples nanoseconds apart, rounding alone can give any speed.
     t_s, n = track.t_s, len(track.t_s)
     later = np.searchsorted(t_s, t_s + 0.5 * track.usual_s, side="left")
     later = np.maximum(later, np.arange(n) + 1)

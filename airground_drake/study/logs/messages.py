@@ -12,14 +12,14 @@ import pandas as pd
 
 from airground_drake.study.logs.stream import HEADERS, PER_S, RECEIPT, Stream, is_elsewhere, segments, unit_since_1970
 
-# Beginnings of types that say nothing about where a robot is, or cannot be told from those that do.
+# Beginnings of names of types without a robot's position, or ambiguous ones.
 NO_PLACES = ("sensor_msgs/", "visualization_msgs/", "rcl_interfaces/", "rosgraph_msgs/", "foxglove.SceneUpdate")
 # Fields with several positions, such as those of motion capture, and with the name of each one's body.
 LISTS, NAMES = ("transforms", "poses", "rigidbodies"), ("name", "rigid_body_name")
 FIXED = "tf_static"  # topic of transforms that do not change
 # Numbers below are seconds, if they are the stamp of a header; the last nanosecond that is counted.
 SECONDS, LAST_NS = 1e8, 2**63 - 1
-ROOTS = ("odom", "map", "world")  # frames that are no robot, although a robot's name may stand before them
+ROOTS = ("odom", "map", "world")  # frames that are not a robot, although a robot's name may precede them
 
 
 class Place(NamedTuple):

@@ -16,13 +16,13 @@ from airground_drake.base.errors import LogError
 Whole = npt.NDArray[np.int64]
 
 PER_S = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}  # units of time, and how many of each are a second
-YEAR_2000_S, YEAR_2100_S = 946_684_800, 4_102_444_800  # stamps since 1970 that are between these are taken as such
+YEAR_2000_S, YEAR_2100_S = 946_684_800, 4_102_444_800  # stamps between these are taken as times since 1970
 PER_M = {"m": 1.0, "cm": 100.0, "mm": 1000.0}  # units of length, and how many of each are a metre
 OF_MESSAGES = HEADERS, RECEIPT = "header stamps", "times of receipt"  # clocks of messages
 LAST = np.iinfo(np.int64).max
-# What loggers put after a body's name.
+# Suffixes that loggers append to a body's name.
 AFTER = re.compile(r"_(?:pos|position|pose|odom|odometry|translation|p)$", re.IGNORECASE)
-# Words in a name that say that it is not about where a body is.
+# Words in a name that exclude a body's position.
 ELSEWHERE = {
     "orientation", "rotation", "quaternion", "quat", "rot", "twist", "linear", "angular", "velocity", "vel",
     "acceleration", "accel", "acc", "force", "torque", "imu", "gyro", "mag", "euler", "rpy", "cmd", "command", "goal",
@@ -40,10 +40,10 @@ def unit_since_1970(least: float, largest: float) -> str:
 class Stream:
     """Positions of one body; n rows, in the order of the source."""
 
-    # A stamp is `whole` + `nano` / 1e9 units of time: nanoseconds since 1970 are no floating-point numbers.
+    # A stamp is `whole` + `nano` / 1e9 units of time: a float cannot represent nanoseconds since 1970.
 
     source: str  # path of the file or folder
-    name: str  # what the source calls it: a topic, the beginning of columns' names, a value in a column, a file's stem
+    name: str  # its name in the source: a topic, a prefix of column names, a value in a column, a file's stem
     whole: Whole  # whole units of time, (n,)
     nano: Whole  # the rest, in billionths of the unit, (n,)
     places: Array  # x, y, z, (n, 3); z is nan where the source lacks it
@@ -80,10 +80,10 @@ class Stream:
 class Log:
     """The content of a log's files."""
 
-    streams: list[Stream] = field(default_factory=list)  # that may be about bodies
-    # What was not used, and why: columns, topics, files; each as it is said.
+    streams: list[Stream] = field(default_factory=list)  # that may describe bodies
+    # Unused columns, topics and files with the reasons, as printed.
     ignored: list[str] = field(default_factory=list)
-    # Files of folders that are no logs, and why; they are among those ignored.
+    # Files in folders that are not logs, with the reasons; part of `ignored`.
     unusable: list[str] = field(default_factory=list)
 
     def add(self, other: Log) -> None:

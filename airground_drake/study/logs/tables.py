@@ -18,7 +18,7 @@ from airground_drake.study.logs.columns import WORDS, Columns, Place, Time, cloc
 from airground_drake.study.logs.stream import PER_M, Log, Stream, Whole, body_of, renamed
 
 TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]  # columns of a file in TUM's format, which has no header
-# First columns of what `ros2 topic echo --csv` prints of a pose; of odometry, the other frame stands before x.
+# First columns that `ros2 topic echo --csv` prints for a pose; for odometry, the other frame precedes x.
 ECHO = ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id", "x", "y", "z"]
 UNIT_LENGTH = 0.05  # the length of a quaternion differs from 1 by less
 MOST_BODIES = 2_000  # different values in a column that names bodies
@@ -33,7 +33,7 @@ class Wanted(NamedTuple):
 
     bodies: Collection[str]  # names of the scenario
     rename: Mapping[str, str]  # bodies by names in the log
-    columns: Mapping[str, str]  # names of columns by what they are
+    columns: Mapping[str, str]  # names of columns by their content
 
     def body(self, name: str, *, is_file: bool = False) -> str:
         """The body that a name in the log stands for, or ''."""

@@ -31,7 +31,7 @@ class Table(NamedTuple):
 
     # Names of the columns; of several header lines, the parts joined by "/"; numbers from 1 without header.
     labels: list[str]
-    cells: pd.DataFrame  # the columns, by number, each a text per row; decimals have a point
+    cells: pd.DataFrame  # the columns by number, with a text per row; decimals have a point
     lines: Sequence[int]  # number of each row's line in the file
     above: list[str]  # lines above the header, and comments
     has_header: bool  # whether there was one
@@ -175,7 +175,7 @@ def _header(lines: Sequence[str], delimiter: str, count: int, unnamed: int) -> t
         header.append(k)
         if is_comment:
             break
-    for row in rows[:-1]:  # what stands above several columns is written once
+    for row in rows[:-1]:  # a header above several columns is written once
         for c in range(1, count):
             row[c] = row[c] or row[c - 1]
     parts = [[row[c] for row in rows if row[c]] for c in range(count)]

@@ -30,13 +30,13 @@ from airground_drake.study.logs.stream import (
 # A body was not recorded where two of its samples are farther apart than this multiple of the usual time between.
 GAP = 2.5
 SINCE_1970_NS = 10**17  # from here on, stamps are since 1970; times are then from the first sample
-# What a table of this package writes after a robot's name if the law steers another point than its body.
+# Suffix of a robot's name in this package's tables for its body, if the law steers another point.
 OF_BODY = ".body"
 SAME_M = 1e-9  # positions of one body at one time that differ by less are one
 # Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed.
 CONTRADICTORY = 0.1
-# A body leaps if it goes farther than this from one row to the next, and this many times faster than it can. Tracking
-# systems do so where they lose a body: they write (0, 0), another number, or the last place again.
+# A body leaps if it moves farther than this from one row to the next, and this many times faster than its limit. Leaps
+# come from tracking systems that lose a body: they write (0, 0), another number, or the last place again.
 LOST_M, LOST = 0.05, 5.0
 ORIGIN_M = 1e-3  # robots that start so close to (0, 0) start there
 MOST_PASSES = 100  # of a search for rows that are lost
@@ -58,8 +58,8 @@ class Track:
     t_s: Array  # times, (n,)
     places_m: Array  # (n, 3); z is nan if the log lacks it
     gap_s: float  # motion between two samples that are farther apart is unknown
-    told: dict[str, str] = field(default_factory=dict)  # where it is from: stream, frame and clock
-    leaps_s: tuple[float, ...] = ()  # times of samples to which the body cannot have come from the one before
+    told: dict[str, str] = field(default_factory=dict)  # origin: stream, frame and clock
+    leaps_s: tuple[float, ...] = ()  # times of samples that the body cannot have reached from the previous sample
     usual_s: float = 0.0  # usual time between two samples
 
     @property
@@ -84,16 +84,16 @@ class Tracks:
     """The bodies of a log."""
 
     bodies: dict[str, Track]  # tracks by name
-    said: list[str]  # what a reader must know of how they were read
+    said: list[str]  # remarks on the import for the reader
     ignored: list[str]  # what was not used
-    origin: str = ""  # what time 0 is: '' if the log's own clock
+    origin: str = ""  # meaning of time 0; '' for the log's own clock
 
 
 class Choice(NamedTuple):
     """Choices of the command line."""
 
     rename: Mapping[str, str] = {}  # bodies by names in the log
-    # Positions in other frames are not used, and these count as one; none: all that are there.
+    # Frames to use, taken as one; positions in others are not used. None: all frames of the log.
     frames: Sequence[str] = ()
     without: Collection[str] = ()  # bodies of the scenario that are not judged
     uavs: Sequence[str] = ()  # further UAVs

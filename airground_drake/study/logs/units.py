@@ -11,14 +11,15 @@ from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
 from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream, unit_since_1970
 
-# Stamps that would make a log so many times longer than the scenario are not since 1970: they are of a finer unit.
+# Stamps that would make a log this many times longer than the scenario are not since 1970 but in a finer unit.
 TOO_LONG = 100.0
-NEAR_M = 0.1  # a log that begins so close to where a body starts begins there, m
-# Times so far apart, in a log so much longer than the scenario, are milliseconds if no robot is too fast then.
+NEAR_M = 0.1  # a log that begins this close to a body's start begins there, m
+# Times this far apart, in a log this many times longer than the scenario, are milliseconds if no robot is then too
+# fast.
 LONG, SELDOM_S = 2.0, 4.0
-# Whole numbers by which robots would be slower or faster than these shares of their limits may count frames.
+# Whole numbers may be frame numbers if, as times, they make robots slower or faster than these shares of their limits.
 SLOW, FAST = 0.2, 2.0
-# So many times the speed limits, the duration or the size of a scenario are taken as a sign of another unit.
+# A multiple of the speed limits, the duration or the size of a scenario that indicates another unit.
 IMPOSSIBLE = 20.0
 NAMES = {
     "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds", "s": "seconds",
@@ -126,8 +127,8 @@ def _is_seldom(streams: Mapping[str, Stream], lasting: float) -> bool:
 
 def _likely(streams: Mapping[str, Stream], scenario: Json) -> tuple[str, str, list[str]]:
     """The unknown units of time and length, and the reasons for others than seconds and metres."""
-    # Metres stand unless they are impossible: then robots would be too fast, whatever the unit of time, or far from the
-    # scenario, and in another unit they start where the scenario has them, or move among what is in it.
+    # Metres are rejected only if robots would be too fast in every unit of time, or far from the scenario, and if in
+    # another unit they start as in the scenario, or move among its bodies.
     times = [""] if all(stream.time_unit for stream in streams.values()) else [*PER_S]
     lengths = [""] if all(stream.length_unit for stream in streams.values()) else [*PER_M]
     usual = times[0] or "s", lengths[0] or "m"
@@ -177,7 +178,7 @@ def _chosen(
         (time, length) for (time, length), motion in moving.items()
         if length in lengths[1:] and motion.is_possible and motion.away <= IMPOSSIBLE
         and (time == times[0] or (is_far and moving[times[0], usual].lasting > IMPOSSIBLE))  # else one unit is enough
-        and (motion.speed * IMPOSSIBLE >= 1.0 or not possible)  # else it is one who drives slowly in another frame
+        and (motion.speed * IMPOSSIBLE >= 1.0 or not possible)  # else the robot drives slowly in another frame
     ]  # fmt: skip
     if others and (is_far or not possible):
         length = min(others, key=lambda both: moving[both].oddness)[1]

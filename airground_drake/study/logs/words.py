@@ -10,8 +10,8 @@ from airground_drake.study.logs.tracks import Span, Tracks
 LEAST_TOLD_M = 0.0005  # smaller approaches do not count, m
 # A robot that starts farther away from its start in the scenario, and from its safe distance, is named, m.
 ELSEWHERE_M = 0.05
-FASTER = 1.01  # a robot that moves at more than this multiple of its limit is named; less may be the noise of positions
-LONGER = 1.01  # a log that is longer than a scenario by more than this says so
+FASTER = 1.01  # a robot faster than this multiple of its limit is named; less may be position noise
+LONGER = 1.01  # a log longer than the scenario by more than this gets a remark
 # Broken pairs, all pairs, stretches of one pair, and remarks that are printed; `--json` and the page have all.
 MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
 
@@ -64,7 +64,7 @@ def doing(pair: JudgedPair) -> str:
         elif came <= -LEAST_TOLD_M:
             told.append(f"{name} moved {-came:.3f} m away")
         else:
-            told.append(f"{name} did neither")
+            told.append(f"{name} moved neither nearer nor away")
     return f"in the second before, {', '.join(told)}"
 
 
@@ -75,17 +75,17 @@ def law(pair: JudgedPair) -> str:
         who = ", ".join(f"{name} {missed_m:.3g} m" for name, missed_m in pair.missed_by_m.items() if missed_m > SMALL)
         by = f" ({who})" if len(pair.missed_by_m) > 1 and who else ""
         held = (
-            f"the law was missed in {pair.lacking} of {pair.intervals} intervals, by up to e = {pair.missed_m:.3g} m, "
-            f"in the {pair.missed_for_s:.4g} s from {pair.missed_at_s:.3f} s{by}"
+            f"the law was violated in {pair.lacking} of {pair.intervals} intervals, "
+            f"by up to e = {pair.missed_m:.3g} m, in the {pair.missed_for_s:.4g} s from {pair.missed_at_s:.3f} s{by}"
         )
     if pair.passive:
-        did = "never brought itself" if pair.missed_m <= SMALL else "brought itself"
+        did = "did not come" if pair.missed_m <= SMALL else "came"
         fast = f"; {pair.second} moved at {pair.too_fast_m_s:.3g} m/s, above its declared speed"
-        return f"{held}: {pair.first} {did} too near{fast if pair.too_fast_m_s else ''}"
+        return f"{held}: {pair.first} {did} too near by its own motion{fast if pair.too_fast_m_s else ''}"
     promise = f"promises {pair.promised_m:.4g} m" if pair.promised_m is not None else "promises no distance"
-    late = f", and what was recorded from {pair.starts_s:.3f} s on starts nearer than required"
+    late = f", but the recording from {pair.starts_s:.3f} s on starts nearer than required"
     late = "" if pair.starts_m >= pair.safe_m - SMALL else late
-    wrong = f"; a law on positions so wrong would have to keep {pair.law_m:.4g} m" if pair.error_m else ""
+    wrong = f"; with these position errors a law must keep {pair.law_m:.4g} m" if pair.error_m else ""
     return f"{held}{late}: the safety theorem {promise}{wrong}"
 
 
@@ -97,8 +97,8 @@ def remarks(judged: Judged) -> Iterator[str]:
     if off := {name: away for name, away in judged.away_m.items() if away > max(near, ELSEWHERE_M)}:
         told = ", ".join(f"{name} by {away:.3g} m" for name, away in off.items())
         yield (
-            f"robots start elsewhere than in the scenario: {told}; if the log is in another frame, its distances from "
-            "obstacles mean nothing"
+            f"robots do not start as in the scenario: {told}; if the log is in another frame, its distances to "
+            "obstacles are meaningless"
         )
 
 

@@ -113,7 +113,7 @@ def scenarios(
         shapes: of the obstacles, names of `KINDS`; default: any of them in half of the scenarios, which may also have
             an arena, and balls in the others.
         moving: whether an obstacle moves; default: none does. Some move faster than they promise. Beside them no robot
-            brings itself too near; the obstacle can break distances.
+            comes too near by its own motion; the obstacle can break distances.
     """
     count = draw(st.integers(1, 4) if ugvs is None else ugvs)
     method = draw(first_of(*sorted(METHODS, reverse=True)) if methods is None else methods)

@@ -24,8 +24,8 @@ from airground_drake.uav.coordination.roadmap import Space
 from airground_drake.uav.coordination.single import Mover
 from airground_drake.uav.coordination.timed import without_repeats
 
-# A robot can go from its start to the nodes within so many widths, by way. They are more than one region's neighbours:
-# robots that have met have little room for their first move.
+# A robot can go from its start to the nodes within this many widths of path length. These are more than the neighbours
+# of one region: robots that have met have little room for their first move.
 FROM_START = 2.0
 # A smaller robot uses the edge of a larger one between the same nodes, unless its own is shorter by this factor.
 NO_LONGER = 1.05
@@ -127,7 +127,7 @@ def _packed(
     width: float,
 ) -> Indices:
     """The nodes `always`, then the `wanted` nodes, in order, that are at least `width`, m, from all chosen ones."""
-    # Nodes behind a wall do not count: only those to which a way leads that is hardly longer than the lattice makes it.
+    # Nodes behind a wall do not count: the way to a node must be hardly longer than on a free lattice.
     count = len(first) - 1
     covered, way_to = np.zeros(count, np.bool_), np.full(count, np.inf)
     chosen, many = np.empty(count + len(always), np.int64), 0

@@ -33,7 +33,7 @@ WIDTHS = (1.45, 1.02, 0.7, 0.5)
 SWAPS_FROM = 1.0
 FIRST = 400  # candidates for each robot in the first round; every further round gets twice as many on each roadmap
 # How much moves are shuffled in each round, in widths, in turn. Some orders of moves lead into a long search, others of
-# the same robots straight to a plan: beginning anew is worth more than going on.
+# the same robots straight to a plan: a new start is better than a longer search.
 NOISES = (0.05, 0.3, 1.0)
 # Number of further plans with shuffled moves, once one is found: on the roadmap that has it, and on the widest two.
 AGAIN = 96

@@ -12,18 +12,18 @@ from airground_drake.uav.coordination.roadmap import RobotTask, Space, build_roa
 from airground_drake.uav.coordination.single import Mover, OtherRobot, Way, find, sum_of_times
 from airground_drake.uav.coordination.timed import at_rest, speed
 
-# No further order of the robots begins after so many searches for single robots, or one part in ten of the effort.
+# No further order of the robots is tried after this many searches for single robots, or a tenth of the effort.
 # Where another order of few robots succeeds, its plan is better than one from joint steps.
 REORDERED, REORDERED_SHARE = 40, 10
 # If a plan by an order takes this many times as long as the robots would alone, a plan by joint steps is made, too,
-# within one part in thirty of the candidates; the better one is taken. Not among known motions: there robots that go in
-# steps of one duration lose more time than an order does.
+# within a thirtieth of the candidates; the better one is taken. Not among known motions: there, steps of one duration
+# cost more time than an order.
 LATE, LATE_SHARE = 1.4, 30
 # A plan by joint steps is improved beside one by an order only if it does not take longer than this many times that
 # one: improving it takes most of the time.
 WORTH = 1.1
-# A plan by joint steps may be improved with so many times the expansions of a whole plan. That of 64 robots in a jam
-# lasted 73 s, and lasts 51 s improved; the orders tried before had left nothing of the effort.
+# Improving a plan by joint steps may take this many times the expansions of a whole plan. For 64 robots in a jam this
+# shortens the plan from 73 s to 51 s; the orders tried before had used up the effort.
 IMPROVING = 2
 # A robot leaves its place within the time in which it travels this many times the distance that robots keep.
 LEAVING = 2.0
@@ -71,15 +71,14 @@ def plan(
 ) -> Plan:
     """Plan paths for robots that keep their distances from obstacles, each other and fixed motions."""
     # 1. The robots are planned for in turn, the longest way first, each among the ways of those before it. If a robot
-    #    finds no way, every robot keeps clear of the starts of later robots until these can have left.
-    # 2. If that fails, robots without a way even alone are left where they are, and the others are planned for again.
-    # 3. If that fails too, further orders are tried for a short while: who found no way comes first in the next one.
-    # 4. If these fail, joint steps of the robots are searched on coarse roadmaps (`first_plan`).
-    # 5. A plan for all of them is improved (`neighbourhoods`). If it is by an order and takes much longer than the
-    #    robots would alone, joint steps are searched for a short while, too, and the better plan is taken.
-    # 6. Without one, robots that find no way stay where they are, and the others go round them.
-    # follow: how long a robot must be able to follow its preset after it has joined it, s.
-    # effort: limits of the work; default: `Effort()`.
+    # finds no way, every robot keeps clear of the starts of later robots until these can have left. 2. If that fails,
+    # robots without a way even alone are left where they are, and the others are planned for again. 3. If that fails
+    # too, further orders are tried for a short while: the robot without a way comes first in the next order. 4. If
+    # these fail, joint steps of the robots are searched on coarse roadmaps (`first_plan`). 5. A plan for all of them is
+    # improved (`neighbourhoods`). If it is by an order and takes much longer than the robots would alone, joint steps
+    # are searched for a short while, too, and the better plan is taken. 6. Without one, robots that find no way stay
+    # where they are, and the others go round them. follow: how long a robot must be able to follow its preset after it
+    # has joined it, s. effort: limits of the work; default: `Effort()`.
     effort = effort or Effort()
     spaces = [space.of(task.body) for task in tasks]
     roadmap = build_roadmap(spaces, tasks, [other.motion[0, 1:] for other in fixed])

@@ -19,7 +19,7 @@ from airground_drake.uav.coordination.intervals import Indices
 from airground_drake.uav.coordination.pibt import Step, Team, fits, give, mixed, must_go
 
 MOST_CONFIGURATIONS = 60_000  # largest number of configurations in a search
-FOR_STEP, FOR_ROBOT = 200, 40  # a step may cost so many candidates, and so many more for each robot
+FOR_STEP, FOR_ROBOT = 200, 40  # largest number of candidates of a step: a constant, and a part for each robot
 
 Status = Literal["found", "exhausted", "effort spent"]
 _STATUS: tuple[Status, ...] = ("found", "exhausted", "effort spent")

@@ -14,7 +14,7 @@ from airground_drake.uav.coordination.roadmap import Roadmap, RobotNodes, RobotT
 from airground_drake.uav.coordination.timed import distance, free_pieces, timed, without_repeats
 
 ROUNDING_M = 1e-9  # distances between robots may fall short by this, m
-MOST_KNOWN = 16  # motions of which a mover remembers what they block: of many robots it would take much memory
+MOST_KNOWN = 16  # number of motions for which a mover stores what they block, to limit memory
 
 
 class OtherRobot(NamedTuple):

@@ -38,13 +38,13 @@ SPEED_TOLERANCE = 1e-4  # a step may be longer than the speed limit allows by th
 # Closer than the safe distance by more than this, m, the avoidance inequalities may ask for more speed than that: they
 # ask for less than 1e-5 m/s per point before, at gains up to 10 1/s.
 INSIDE_M = 1e-6
-LONGER = 1e-6  # of two ways left, one is longer if it is by more than this, relative
+LONGER = 1e-6  # relative difference above which one of two remaining ways is longer
 # Width of an enclosure of the optimum, relative to the cheaper constant plan's cost, up to which a gap is known.
 WIDEST = 1e-5
 BLOCKS = 10  # all plans of at most so many choices are evaluated by exact distances, too
 # All plans of so many blocks can be evaluated along half-planes; they enclose the optimum of the route's problem.
 MOST_BLOCKS = 12
-TIE = 1e-9  # accumulated deficits closer to 1/2 than this are a tie: either mode may follow
+TIE = 1e-9  # accumulated deficits this close to 1/2 are a tie: either mode may follow
 ROUNDED_ROUTES = ("relaxed", "nonlinear")  # routes that solve (27) and round by (28)-(29)
 WIDE = 1e-5  # relative width of an enclosure above which a better omega* is looked for
 NO_PROBLEM = "method (d) compares two predicted outcomes and solves no problem (26)"
@@ -126,7 +126,7 @@ class GatePlan(GateClaim):
             _of_decisions(trace, rows, compared, beside_all, optimum)
             | {
                 "without_a_plan": [row.label for row in rows if not row.planned],
-                "largest_slack_m": max(slack, default=0.0),  # how far a plan leads inside a safe distance at most
+                "largest_slack_m": max(slack, default=0.0),  # largest intrusion of a plan into a safe distance
                 "plans_with_slack": sum(value > 0.0 for value in slack),
                 "rounded_plans": len(rounded),
                 "largest_rounding_error_s": max(map(integrated_error_s, rounded), default=0.0),
@@ -204,14 +204,14 @@ def _seen_at(trace: Trace, row: DecisionRecord) -> Array:
 
 def _clear(trace: Trace, row: DecisionRecord, positions: Array, period: float) -> Flags:
     """Stages (N,) in which no control sample (every `period`, s) is within a safe distance by more than rounding."""
-    # Neither the points of the problem nor the barriers themselves may be so near: of a wall the problem has but
+    # Neither the points of the problem nor the barriers themselves may be this near: the problem represents a wall by
     # points.
     centres = row["centres_m"]
     before = centres[0] - (centres[min(1, len(centres) - 1)] - centres[0])
     start = (np.linalg.norm(row["initial_m"] - before, axis=1) - row["distances_m"]).min(initial=np.inf)
     inside = np.concatenate([[start], row.clearance(positions)]) < -INSIDE_M
     inside |= are_too_near(trace, row.robot, np.concatenate([row["initial_m"][None], positions]), row.t_s, INSIDE_M)
-    several = row.dt > period + TIME_TOLERANCE_S  # samples within the stage: what they see is not recorded
+    several = row.dt > period + TIME_TOLERANCE_S  # samples within the stage: what they sense is not recorded
     return ~(inside[:-1] | (inside[1:] & several))
 
 
@@ -419,7 +419,7 @@ def _minimiser(row: DecisionRecord, multiplier: Array) -> Array:
 def _solve(rows: Sequence[DecisionRecord]) -> tuple[list[Array], list[Array]]:
     """Relaxed plans (N,) and multipliers (N, m) >= 0, costs relative to each scale, of all rows as one program."""
     # Variables, stage by stage of row by row: task errors e = rho - reference, omega and u.
-    import cvxpy  # takes a second, which other claims need not wait for
+    import cvxpy  # takes a second, which only this claim needs
 
     cp: Any = cvxpy  # its types are incomplete
     stages = rows[0].stages

@@ -15,7 +15,7 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
 OLD = "distance promised to UGVs that act on old positions"
-ROUNDED_M = 1e-12  # by so much rounding may make a distance of the law too small, m
+ROUNDED_M = 1e-12  # largest deficit of a distance of the law through rounding, m
 BASIC = ("Budget.at_samples", "Budget.budget_always")
 # Those about a robot beside an obstacle that may move; a plant adds its own.
 OF_STANDING = ("Budget.one_stands", "Budget.smaller_gain", "Mixed.entry_keeps")
@@ -158,7 +158,7 @@ class SafeBudget(TheoremClaim):
                 f"the {pair['safe_m']:.6g} m promised"
             )
             margin = max(kept, 0.0) - pair["safe_m"]
-            holds = margin * pair["safe_m"] >= -ROUNDED_M * pair["law_m"]  # rounding in the law, seen in what is kept
+            holds = margin * pair["safe_m"] >= -ROUNDED_M * pair["law_m"]  # rounding in the law
             yield Hypothesis(self.margin_of, says, margin, "m", holds)
             if error_m and not passive:
                 least = least_gain(pair["safe_m"], *both)

@@ -14,14 +14,14 @@ from airground_drake.verify.runs.proposals import below_avoidance
 class SafeGate(SafeInv):
     id = "SAFE-GATE"
     subject = "proof of distances"
-    summary = "Under method (d) no request of the UAV makes a robot bring itself closer than the safe distance."
+    summary = "Under method (d) no request of the UAV makes a robot move closer than the safe distance."
     statement = (
         "Under method (d) no intervention, accepted or not, leads out of the safe set. The avoidance layer is applied "
         "last. From a safe state every command meets all inequalities if it is scaled back far enough; then SAFE-INV "
         "applies. The proof does not depend on the optimiser, its horizon or the UAV's proposals. The UAV, as a robot,"
         " must keep its own share of each inequality. All messages between UAVs and UGVs may be lost. This is about "
-        "robots and static obstacles. Beside an obstacle that may move, no request of the UAV makes a robot bring "
-        "itself too near, because v = 0 also meets the passive inequality."
+        "robots and static obstacles. Beside an obstacle that may move, no request of the UAV makes a robot come "
+        "too near by its own motion, because v = 0 also meets the passive inequality."
     )
     latex = (
         r"b_k \le 0, \; 0 \le c \le \frac{b_k}{n_k^\top u} \text{ wherever } n_k^\top u < b_k \; \Rightarrow \; "

@@ -52,12 +52,12 @@ MOST_LISTED = 300  # pairs that the evidence lists at most: those with the least
 AVOIDANCE = "avoidance"  # the hypothesis that the steps met the inequalities
 PASSIVE = "avoidance beside an obstacle that may move"  # the hypothesis that the steps met the passive law
 DECLARED = "declared speed"  # the hypothesis that an obstacle moved no faster than it was expected to
-# The hypotheses that a pair begins apart: the points that the law steers, and the bodies that lag or come late.
+# The hypotheses that a pair begins apart: the points that the law steers, and bodies with a lag or delay.
 START, BODIES = "safe start", "safe start of the bodies"
-MEASURED = "error of the measured position"  # the hypothesis that robots are no farther from where they are seen
-ANNOUNCED = "announced position"  # the hypothesis that robots are where they said that they would be
-UNHEARD = "standing without a message"  # the hypothesis that UGVs stand who do not know where a near one is
-BUILT = "controller parameters"  # the hypothesis that the controllers were built with what the scenario demands
+MEASURED = "error of the measured position"  # the hypothesis that the errors of measured positions keep their bounds
+ANNOUNCED = "announced position"  # the hypothesis that robots are at their announced positions
+UNHEARD = "standing without a message"  # the hypothesis that UGVs stand while a near one's position is unknown
+BUILT = "controller parameters"  # the hypothesis that the controllers were built with the scenario's parameters
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,14 @@ class Guarantee(NamedTuple):
     """The promised distance of a pair of bodies: their gap is at least `gap_m` at all times of the run."""
 
     pair: Pair  # the two bodies
-    # How far each sample misses the inequalities, e_i + e_j, (K,), m per control period; 0: both are met.
+    # Violation of the inequalities at each sample, e_i + e_j, (K,), m per control period; 0: both are met.
     missed_m: Array
-    short_m: float  # how much too close the steered points started, or were when the obstacle appeared, m
+    short_m: float  # deficit of the distance of the steered points at the start, or when the obstacle appeared, m
     # What the bodies keep where their steered points keep m - max(e / a - w / A, short_m). There m is the distance in
     # the law, e the largest of `missed_m`, a = min(A h, 1), and w the drift that users' plants declare. Without a gain
-    # nothing is restored, and the points keep m - K e - short_m. -inf: nothing is promised.
+    # no distance is restored, and the points keep m - K e - short_m. -inf: no guarantee.
     gap_m: float
-    why: str = ""  # the reason if nothing is promised
+    why: str = ""  # the reason if there is no guarantee
 
     @property
     def margin_m(self) -> float:
@@ -190,7 +190,7 @@ class SafeHyp(TraceClaim):
         in_range, binding = _binding(trace)
         evidence: dict[str, Any] = {
             "e_m": float(max((promised.missed_m.max() for promised in kept), default=0.0)),
-            # None if no pair came within reach, or nothing is promised for one that did
+            # None if no pair came within reach, or there is no guarantee for a pair that did
             "guarantee_m": _finite(kept[0].gap_m) if kept else None,
             "pairs": listed,
             "pairs_in_reach": len(kept),
@@ -320,7 +320,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
                 gap, why = -inf, f"{BODIES} missed by {-start:.3g} m"
             elif pair.error_m and not _bears_errors(pair, gain, lost):
                 gap, why = -inf, "the steered points came too near for errors of measured positions"
-            elif lost > 0:  # it comes off what the points keep, from which follows what the bodies keep
+            elif lost > 0:  # it reduces the distance of the points, which gives the distance of the bodies
                 points = nextafter(pair.law_m - rounded_up(lost), -inf)
                 kept = kept_distance(points, *both, gain=trace.scenario.control.avoidance_gain_1_s) - pair.radii_m
                 gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
@@ -497,7 +497,7 @@ def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
         least = pair_of(trace, first, second).law_m + bounds[first].error_m + bounds[second].error_m
         spare = apart - least - (speed[first] + speed[second]) * period
         driven = period * np.linalg.norm(trace.chosen(first), axis=1)
-        spare[heard > t] = -inf  # heard at no time so far
+        spare[heard > t] = -inf  # never heard so far
         unheard = np.minimum(np.maximum(spare, 0.0 - driven), 0.0)
         margin = np.where(np.abs(heard - t) <= TIME_TOLERANCE_S, 0.0, unheard)
         yield _Hypothesis(UNHEARD, "m", t, margin, DISTANCE_TOLERANCE_M, {"first": first, "second": second})

@@ -59,7 +59,7 @@ class SafeOwn(TraceClaim):
         try:
             return any(barrier.expected_speed_m_s > 0.0 for barrier in trace.scenario.barriers.values())
         except TraceError:
-            return True  # `judge` says what is wrong
+            return True  # `judge` reports the fault
 
     def check(self, trace: Trace) -> Finding:
         margins = sorted(_margins(trace), key=lambda own: own.margin_m)
@@ -99,6 +99,6 @@ def _margins(trace: Trace) -> Iterator[OwnMargin]:
                 continue
             other = pair.second if robot == pair.first else pair.first
             margins = own_margins(trace, pair, robot).least
-            k = int(np.argmin(margins))  # the first one that is not a number, if there is any
+            k = int(np.argmin(margins))  # the first one that is not a number, if any
             if margins[k] != np.inf:
                 yield OwnMargin(robot, other, float(margins[k]), float(trace.t[k + 1]))

@@ -104,7 +104,7 @@ class SafeTrace(TraceClaim):
 class Distance:
     """The closest approach of a pair, in row `row`: distances of surfaces, m, and the time, s."""
 
-    # It was exercised if one control period at full speed would have broken the safe distance, or that of the law.
+    # It was exercised if one control period at full speed would have broken the safe distance, or the law's distance.
 
     first: str
     second: str

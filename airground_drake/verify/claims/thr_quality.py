@@ -43,8 +43,8 @@ class Decided:
     t_s: float  # time of the trigger, or of the excursion's end, s
     kind: Literal["served", "early", "false", "missed"]  # see above
     error_m: float  # task error then; at its largest for a missed excursion, m
-    off_m: float  # how far the error was from the threshold: below it at the trigger, or above it before the trigger, m
-    late_s: float | None  # time since the error reached the threshold, s; negative: until then; None: it did not
+    off_m: float  # distance of the error from the threshold: below it at the trigger, or above it before the trigger, m
+    late_s: float | None  # time since the error reached the threshold, s; negative: until then; None: not reached
 
 
 class ThrQuality(TraceClaim):

@@ -182,7 +182,7 @@ class Reconstruction(NamedTuple):
 
     evidence: dict[str, Any]  # `events` are those that the trace must have
     predicted: list[Transition]  # the automaton's
-    wrong: list[Conflict]  # all that disagrees
+    wrong: list[Conflict]  # all disagreements
 
 
 def _judged(trace: Trace, ugv: str, levels: TriggerLevels) -> Reconstruction:

@@ -118,8 +118,8 @@ def _minima(t: Array, parts: Array) -> Array:
 
 
 ROWS = 32  # Of a block. Between rows a robot moves straight, so on a block it stays in the box around its rows.
-AT_ONCE = 300_000  # pairs of boxes that are compared together, so that they fit into the memory
-ROUNDING_M = 1e-9  # what a bound allows for rounding, m: distances up to 1e4 m err by 1e-12 m
+AT_ONCE = 300_000  # number of pairs of boxes compared together, to limit memory
+ROUNDING_M = 1e-9  # allowance of a bound for rounding, m: distances up to 1e4 m err by 1e-12 m
 
 
 class Boxes(NamedTuple):

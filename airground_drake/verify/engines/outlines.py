@@ -24,7 +24,7 @@ from airground_drake.verify.engines.geometry import ROUNDING_M, ROWS, boxes_of
 # What the numbers of an *outline* in a trace mean: distance to keep, radius of the rounding, speed, heights of the
 # core, number of corners, a circle round them, and the corners; `model.geometry.outline` describes it.
 GAP, RADIUS, SPEED, BASE, TOP, COUNT, MIDDLE, EXTENT, CORNERS = 0, 1, 2, 3, 4, 5, 6, 8, 9
-AT_ONCE = 100_000  # places, or pairs of boxes, that are compared together, so that they fit into memory
+AT_ONCE = 100_000  # number of places, or pairs of boxes, compared together, to limit memory
 BATCH = 32  # blocks of rows whose approaches are computed together
 TOUCHING_M = 1e-6  # a motion that comes this near to a polygon may lead through it, m
 

@@ -31,8 +31,8 @@ from airground_drake.verify.engines.outlines import Cores, away_from
 
 SCREEN_M = 1e-9  # floats decide pairs by more than this, m: for bodies within 1e5 m they err by less than 1e-10 m
 BITS = 160  # lengths are enclosed to 2^-160 units
-# Inside a core any face counts that is the nearest to within this, m: floats may take another one for the nearest. By
-# how much it is farther away counts as missed.
+# Inside a core every face counts whose distance exceeds the nearest face's by no more than this, m: floats may choose
+# another one. The excess counts as missed.
 TIE_M = Fraction(1, 10**12)
 POINT = Cores(np.zeros((1, 2)), np.array(0.0), np.array(0.0))  # the core of a body whose place is its centre
 
@@ -49,8 +49,8 @@ def shortfalls(
 ) -> Array:  # fmt: skip
     """A pair's violation at each sample, e_1 + e_2, rounded up: (K,), m per control period."""
     # With a body that may move with V, the first one alone keeps the passive law: share 1, gain 0, d + V h in place of
-    # d, and the second held where it is at each sample. Then e is what the first one may lack of min(D, d + V h) by its
-    # own doing.
+    # d, and the second held where it is at each sample. Then e bounds how much the first one reduces min(D, d + V h) by
+    # its own motion.
     # first, second: (K + 1, 3), m
     # gain: a.
     # planar: whether the first body stays in its plane: then no way leads out of a core through its top.
@@ -94,7 +94,7 @@ def _doubtful(first: Array, other: Array, pair: _Pair, last: float, *, by_law: b
         step = np.zeros_like(body[1:]) if pair.held and sign < 0.0 else np.diff(body, axis=0)
         step[-1] /= last
         reach += np.linalg.norm(step, axis=1)
-        if part > 0.0:  # nothing is asked of an obstacle
+        if part > 0.0:  # an obstacle has no inequality
             met &= sign * np.einsum("ka,ka->k", normal, step) - part * bound > SCREEN_M
     return np.flatnonzero((distance - d - reach <= SCREEN_M) & ~met)
 
@@ -146,7 +146,7 @@ class _Way(NamedTuple):
 
 def _ways_off(shape: _Shape, place: Sequence[int], planar: bool, unit: int) -> list[_Way]:
     """The directions away from a core, or out of it by the nearest faces (ties within `TIE_M`); none on a point."""
-    # On a wall both sides will do.
+    # On a wall both sides are right.
     x, y, z = place
     corners, count = shape.corners, len(shape.corners)
     edges = [(a, _minus(b, a)) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]

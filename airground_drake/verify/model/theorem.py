@@ -15,9 +15,9 @@ from airground_drake.verify.proofs import THEOREMS, standing
 class Hypothesis:
     """A hypothesis of a theorem with the numbers of a scenario."""
 
-    hypothesis: str  # what the margin is of, in a few words
+    hypothesis: str  # the quantity with the margin, in a few words
     says: str  # the hypothesis in words
-    margin: float  # how far it is from failing, in `unit`
+    margin: float  # margin of the hypothesis, in `unit`
     unit: str
     holds: bool
 

@@ -14,7 +14,7 @@ from airground_drake.verify.proofs.record import ALLOWED_AXIOMS, RECORD, closure
 from airground_drake.verify.proofs.theorems import FOLDER, THEOREMS
 
 LIMIT_S = 600.0  # Wall-clock time for one call of Coq, s. The longest, `coqchk`, takes some 30 s.
-# Words with which a file could assume what it should prove, or turn off Coq's own checks.
+# Words with which a file could assume a statement instead of a proof, or turn off Coq's own checks.
 UNSOUND = re.compile(
     r"\b(Admitted|admit|give_up|Axioms?|Parameters?|Conjecture|Declare\s+ML\s+Module|bypass_check|Unset\s+\w+\s+Checking"
     r"|Type\s+In\s+Type|Load|Extract\s+\w+|Drop)\b"

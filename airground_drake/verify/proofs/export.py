@@ -31,8 +31,8 @@ from airground_drake.verify.proofs.coq import without_comments
 from airground_drake.verify.proofs.separating import Prism, Vector, root_up, separating
 from airground_drake.verify.proofs.theorems import FOLDER
 
-# A dip is rounded down by so much, m: the sum of a budget then is no more than its floating-point value. A dip is the
-# bound of an arc that is not attained, by far more.
+# A dip is rounded down by this, m, so that the sum of a budget is not above its floating-point value. The arc stays far
+# below its dip.
 ROUNDED_M = Fraction(1, 2**45)
 # Positions are rounded to 1/PARTS m: some coordinates are as small as 1e-100 m. At a metre binary64 is coarser.
 PARTS = 2**60
@@ -60,15 +60,15 @@ class Demand(NamedTuple):
     second: str  # the other body
     required_m: Fraction  # distance of their surfaces, m
     radii_m: Fraction  # sum of their radii, m
-    # What the second body is without its radius: "" for a point, "ground" for flat convex sets, "solid" for prisms.
+    # Core of the second body: "" for a point, "ground" for flat convex sets, "solid" for prisms.
     core: str = ""
     # Whether the second body is an obstacle that may move, beside which robots follow the passive law.
     passive: bool = False
-    # How far the two bodies may be off the recorded straight lines in all, m; or, where the law's points are recorded,
-    # what the law adds to the distance.
+    # Sum of both bodies' largest distances from the recorded straight lines, m; or, where the law's points are
+    # recorded, the law's addition to the distance.
     room_m: Fraction = Fraction(0)
     late: bool = False  # whether one of the two has a lag or a delay, or they act on old positions of each other
-    called: tuple[str, str] = ("", "")  # what the scenario calls the two, where `first` and `second` are names for Coq
+    called: tuple[str, str] = ("", "")  # names of the two in the scenario; `first` and `second` are names for Coq
 
     @property
     def body_m(self) -> Fraction:
@@ -100,7 +100,7 @@ class Recorded:
     places: Mapping[str, tuple[Place, ...]]
     demands: tuple[Demand, ...]  # pairs and distances
     gain: Fraction  # a h, the product of gain and control period, at most 1 (see `capped` in Safety.v)
-    # How far bodies may be off the straight lines between these places, m; 0 of those that are not named.
+    # Largest distance of bodies from the straight lines between these places, m; 0 if not named.
     off_m: Mapping[str, Fraction]
     # The convex sets of demands, by name, from where their body is.
     sets: Mapping[str, tuple[ConvexSet, ...]] = field(default_factory=dict)
@@ -143,7 +143,7 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
     scenario, control = trace.scenario, trace.scenario.control
     barriers = scenario.barriers
     places: dict[str, tuple[Place, ...]] = {}
-    for name, obstacle in barriers.items():  # corners are given in the frame of the world, or that of what moves
+    for name, obstacle in barriers.items():  # corners are in the world frame, or in the frame of the moving body
         is_ball = convex_parts(obstacle) is None
         places[name] = (_rounded((is_ball and obstacle.position_m) or (0.0, 0.0, 0.0)),)
     moving = [name for name, obstacle in barriers.items() if obstacle.moves]
@@ -166,7 +166,7 @@ def recorded(trace: Trace, *, steered: bool = False) -> Recorded:
     )
 
 
-# Keys of bodies that theorems take into account, or need not.
+# Keys of bodies that theorems account for, or need not.
 COVERED = frozenset(
     {"start_m", "target_m", "preset", "max_speed_m_s", "radius_m", "name", "altitude_m", "task", "phantoms_m"}
     | {"ugvs", "lost_at_s"}

@@ -128,7 +128,7 @@ def _compare_theorem(theorem: str, text: str, trace: Trace, kinds: Sequence[str]
         raise ReadbackError(f"{theorem} is not about all of the run's time")
     matches = sorted((match for kind in kinds for match in re.finditer(kind, body)), key=re.Match.start)
     claims = [(m["first"], m["second"], m.groupdict().get("sets", ""), _value(m["safe"])) for m in matches]
-    for kind in kinds:  # what is left has to be conjunctions and their parentheses alone
+    for kind in kinds:  # the rest must be conjunctions and their parentheses alone
         body = re.sub(kind, "", body)
     if claims != wanted or re.sub(r"[\s()]", "", body) != "/\\" * (len(claims) - 1):
         raise ReadbackError(f"{theorem} does not claim the scenario's distance of every pair")

@@ -28,7 +28,7 @@ from airground_drake.verify.proofs.table import Entry, Missed, TooNear, entries,
 from airground_drake.verify.proofs.theorems import FOLDER
 
 SCHEMA = "airground_drake.proofs/1"
-PLACE = "proofs"  # folder of a report for what is proved about it
+PLACE = "proofs"  # folder of a report for its proofs
 FOUND = "proofs.json"  # file in that folder with the results
 # Part of Coq's message if a checker has computed `false` where the proof says `true`.
 COMPUTED = "is expected to have type"
@@ -53,7 +53,7 @@ class CoqReply:
     axioms: Sequence[str] = ()  # of the proof
     seconds: float = 0.0  # how long Coq took, s
     entries: int = 0  # of the run's table that it accepts; 0 in an answer about distances
-    missed: Sequence[Missed] = ()  # pairs with periods that no entry is about
+    missed: Sequence[Missed] = ()  # pairs with periods without an entry
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def prove(place: Workshop, run: Trace, limit_s: float = coq.LIMIT_S) -> tuple[Co
 
 def _law(run: Trace, exact: Recorded, *, proved: bool) -> tuple[Recorded, list[Entry], str]:
     """The record of the steered points, its table, and the file about it; '' without an entry."""
-    # proved: whether Coq accepts the file about distances: then the file about the law may take positions from there.
+    # proved: whether Coq accepts the file about distances; the file about the law may then use its positions.
     lawfully = recorded(run, steered=True) if exact.off_m else exact
     table = entries(lawfully)
     return lawfully, table, law_file(lawfully, table, alone=not proved or lawfully is not exact) if table else ""
@@ -243,7 +243,7 @@ def listed(gaps: Iterable[Missed]) -> list[dict[str, Any]]:
 
 Broken = tuple[str, Any, Any]  # what is wrong, what it should be, and what is recorded
 
-# What is said of a theorem that is proved, and of one that is not, besides name and file.
+# Entries of a proved and of an unproved theorem, besides name and file.
 _PROVED, _UNPROVED = ("axioms", "seconds", "entries"), ("why", "too_near", "entries", "missed")
 
 

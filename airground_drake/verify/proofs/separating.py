@@ -17,7 +17,7 @@ Stretch = tuple[int, Vector]  # a number of periods, and the vector that separat
 
 # Lengths of rounded vectors. They lose about the distance / length^2, and Coq multiplies short numbers faster.
 SCALES = (2**4, 2**12, 2**30)
-TRIES = 8  # how often a longer stretch is looked for
+TRIES = 8  # number of searches for a longer stretch
 
 
 class Prism(NamedTuple):

@@ -159,7 +159,7 @@ class TooNear:
 
     demand: Demand  # the pair, and the distance that it is to keep
     least_m: float  # least distance of its surfaces; below 0 they overlap
-    short_m: float  # by how much that is too little
+    short_m: float  # the deficit
     t_s: float  # when the pair is so near
 
     def __str__(self) -> str:

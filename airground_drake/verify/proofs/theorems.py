@@ -23,9 +23,9 @@ class Theorem:
 
     name: str  # file and name in Coq, such as "Safety.safe_always"
     equation: str  # number of the paper's equation that it is about, or "ours"
-    statement: str  # what it says, in one plain sentence
+    statement: str  # its statement, in one plain sentence
     hypotheses: tuple[str, ...]  # a sentence each
-    silent_on: str  # what it does not say, in one plain sentence; empty if nothing needs to be said
+    silent_on: str  # what it does not state, in one plain sentence; may be empty
 
 
 def _read(file: Path) -> Iterator[Theorem]:

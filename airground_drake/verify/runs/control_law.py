@@ -15,19 +15,19 @@ from airground_drake.verify.runs.old_positions import heard_places, unsure_m
 from airground_drake.verify.runs.pairs import contacts, is_planar, pairs_beside, parts_of
 
 PLANE = np.array([1.0, 1.0, 0.0])  # directions in which a UGV can move
-ON_TOP = ("b", "c")  # methods that put an accepted intervention above the avoidance inequalities, as (20) does
+ON_TOP = ("b", "c")  # methods with accepted interventions above the avoidance inequalities, as in (20)
 
 
 class Inequalities(NamedTuple):
     """Inequalities normal.v >= bound of a robot along its run, C of them."""
 
-    # They are by control sample; at each, in the order of the controller: barriers at rest, robots, barriers that move.
+    # Sorted by control sample, then in the order of the controller: barriers at rest, robots, barriers that move.
 
     sample: Indices  # number of the control sample, (C,)
     # What is avoided, (C,): the number of a part in `pairs.parts_of`, or that of a robot after all parts.
     column: Indices
     normal: Array  # (C, 3)
-    distance: Array  # from what is avoided, or where it was when last heard of, (C,), m
+    distance: Array  # distance from the avoided body, or from its last known position, (C,), m
     bound: Array  # (C,), m/s
     retreat: Array  # n.v at which the robot should retreat, (C,), m/s, a task below all inequalities; 0: it need not
 
@@ -40,7 +40,7 @@ def least_speeds(distance: Array, safe: Array, share: Array, control: Control, s
     """Set-based avoidance (7)-(8), (11): n.v >= share A (d - D) where D <= d, else n.v >= share (d - D) / h."""
     # Beside a body that may move with V > 0 it is n.v >= -(D - d - V h) / h, and never more than n.v >= 0.
     # distance, safe: m; speed: m/s
-    # Returns the bounds, (...), m/s; -inf where D > R: nothing is asked there.
+    # Returns the bounds, (...), m/s; -inf where D > R: no inequality applies there.
     period = control.period_s
     bound = share * demanded(safe - distance, control.avoidance_gain_1_s, 1.0 / period)
     passive = np.minimum(-(distance - safe - speed * period) / period, 0.0)

@@ -43,7 +43,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
     for pair in declared_pairs(trace):
         first, second = number[pair.first], number[pair.second]
         for i, j in ((first, second), (second, first)):
-            if i >= len(barriers):  # a barrier avoids nothing
+            if i >= len(barriers):  # a barrier does not avoid others
                 i -= len(barriers)
                 safe[i, j], share[i, j] = pair.law_m, -pair.error_m if pair.error_m and pair.speed_m_s else pair.share
                 if pair.asynchronous:
@@ -79,7 +79,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             wanted[name]["stands"] = True
         if len(moving):
             wanted[name]["moving_outlines"] = that_move
-    if own := scenario.ugv_controller:  # it is judged by its steps, whatever it was built with
+    if own := scenario.ugv_controller:  # it is judged by its steps, whatever its parameters
         sampling_s = wanted["ugv_controller"]["sampling_s"]
         return wanted | {"ugv_controller": {"class": own.kind, "sampling_s": sampling_s}}
     of_run = scenario.runs[trace.run]

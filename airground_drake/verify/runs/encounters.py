@@ -56,14 +56,14 @@ def steps_of(trace: Trace, robot: str) -> Array:
 class OwnMargins(NamedTuple):
     """A robot's margins to a required distance by its own motion, in the segments between rows, (T - 1,), m."""
 
-    # inf: the two were too far apart for one period to matter, or not both there.
+    # inf: the two were too far apart for one period to matter, or one was absent.
 
     # Of min(D, L) - c, which the theorem promises. D is the distance of the steered points at the control sample, L
     # what the law keeps, V h included, and c how far both bodies may be from the steered points. Bodies that are nearer
     # than D - c already may stay so.
     of_law: Array
     # Of min(D, d) where the gap is below the required one: D of the bodies at the sample, d the distance to keep. Only
-    # c lets it fall below the margin of the law. Where two bodies start or appear too near, it is not asked until they
+    # c lets it fall below the margin of the law. Where two bodies start or appear too near, it applies only after they
     # have been apart.
     of_body: Array
 
@@ -82,7 +82,7 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     place = trace.body(robot)
     origin = origin_of(trace, other)
     planar = is_planar(trace, robot)
-    # Errors of measured positions may take all that the law keeps beyond d.
+    # Errors of measured positions may use up all that the law keeps beyond d.
     keeps = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m
     keeps = pair.safe_m if pair.error_m and not pair.speed_m_s else keeps
     off_m = off_m_of(trace, robot)
@@ -134,22 +134,22 @@ class Encounter(NamedTuple):
     second: str  # the obstacle or the other robot
     required_m: float  # gap to keep
     gap_m: float  # the least gap; 0 where they overlap
-    t_s: float  # when they collided, or else when the gap was least
-    collided: bool  # whether they did; the model lets both go on
-    # `robot` if the motion of a robot itself took of the distance; `under way` if it did so only within what the law
-    # grants to a body that lags or gets its commands late; `other` if the other body's motion took all; `nobody` if
-    # they started or appeared there.
+    t_s: float  # time of the collision, or else of the least gap
+    collided: bool  # whether they collided; in the model both go on
+    # `robot` if a robot's own motion reduced the distance; `under way` if it did so only within the law's allowance for
+    # a body with a lag or delay; `other` if only the other body's motion reduced it; `nobody` if they started or
+    # appeared there.
     doing: str
-    # How far a body that lags or gets its commands late drove on, from where it was last as far as required, or where
-    # the other appeared, to where the gap was least; 0 unless that is why, or it appeared.
+    # How far a body with a lag or delay drove on, from its last place at the required distance, or from its place when
+    # the other appeared, to the least gap; 0 unless this is the cause, or the other appeared.
     under_way_m: float
     appeared: bool  # whether the obstacle appeared nearer than required
-    # What the robot did beside an obstacle that may move: `retreated at its limit`, `retreated`, `stood` or `moved
+    # The robot's action beside an obstacle that may move: `retreated at its limit`, `retreated`, `stood` or `moved
     # aside`; '' beside others.
     reaction: str = ""
-    speed_m_s: float = 0.0  # of the robot's command then
+    speed_m_s: float = 0.0  # speed of the robot's command then
     blocked_by: tuple[str, ...] = ()  # the bodies whose inequalities kept it from retreating
-    caught_s: tuple[float, ...] = ()  # from when to when they did, without a pause; () if never
+    caught_s: tuple[float, ...] = ()  # first and last time without a pause in which they did; () if never
 
     def told(self, trace: Trace) -> str:
         """The cause, as a sentence without a full stop."""
@@ -157,15 +157,15 @@ class Encounter(NamedTuple):
             drove = f"{self.first} drove {self.under_way_m:.2f} m on by commands under way"
             return f"{drove}, to {self.gap_m:.2f} m from {self.second}"
         if self.doing == "robot":
-            return f"{self.first} brought itself to {self.gap_m:.2f} m from {self.second}"
+            return f"{self.first} moved to {self.gap_m:.2f} m from {self.second}"
         if self.doing == "nobody" and self.appeared:
             t_s = trace.t[trace.there_from(self.second)]
-            told = f"{self.second} appeared at {t_s:.9g} s too near to {self.first}: nobody's doing"
+            told = f"{self.second} appeared at {t_s:.9g} s too near to {self.first}: not caused by motion"
             if not self.under_way_m:
                 return told
             return f"{told}; {self.first} drove {self.under_way_m:.2f} m on by commands under way"
         if self.doing == "nobody":
-            return f"{self.first} starts {self.gap_m:.2f} m from {self.second}: nobody's doing"
+            return f"{self.first} starts {self.gap_m:.2f} m from {self.second}: not caused by motion"
         speed = f", {self.speed_m_s:.2f} m/s" if self.reaction.startswith("retreated") else ""
         blocked = f", blocked by {' and '.join(self.blocked_by)}" if self.blocked_by else ""
         came = f"{self.second} came to {self.gap_m:.2f} m by its own motion"

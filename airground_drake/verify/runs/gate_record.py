@@ -79,7 +79,7 @@ class DecisionRecord:
 
     def gaps(self, positions: Array, normals: Array | None = None) -> Array:
         """Distances minus d at the end of each stage, (..., N, m), m; along normals (N, m, 3) if given."""
-        # Normals are unit vectors, or 0 where nothing is asked: the gap there is 0.
+        # Normals are unit vectors, or 0 where no half-plane applies: the gap there is 0.
         away = positions[..., None, :] - self["centres_m"]
         if normals is None:
             return np.linalg.norm(away, axis=-1) - self["distances_m"]

@@ -46,13 +46,13 @@ class Pair(NamedTuple):
     radii_m: float  # sum of both radii
     share: float  # part of the avoidance inequality that each robot takes: all beside a barrier, half beside a robot
     reach_m: float  # how far they can approach each other in one control period
-    row: int  # from which on both are there
-    last: int  # row up to which both are there
-    # At which robots expect the barrier to move at most; above 0 the robot's law is the passive one.
+    row: int  # first row at which both are present
+    last: int  # row up to which both are present
+    # Largest speed of the barrier that robots expect; above 0 the robot's law is the passive one.
     speed_m_s: float = 0.0
     more_m: float = 0.0  # distance that the law keeps beyond `safe_m`
-    # How far both bodies may be from the points that the law steers after a period, together: what users' plants may
-    # miss of their commands included.
+    # Sum of both bodies' largest distances from their steered points after a period, including the drift of users'
+    # plants.
     cover_m: float = 0.0
     drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
     error_m: float = 0.0  # sum of the bounds of the errors of the measured positions
@@ -60,8 +60,8 @@ class Pair(NamedTuple):
     slip_m: float = 0.0  # how much of its command the robot may miss in a control period
     # How far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
     drawn_m: float = 0.0
-    # For how long commands already given lead the bodies, where the theorem asks for a safe start of the bodies, too
-    # (drawn, lagging or late ones); None where it does not.
+    # Duration of commands already given, where the theorem requires a safe start of the bodies, too (with random
+    # position errors, lag or delay); None where it does not.
     under_way_s: float | None = None
 
     @property
@@ -198,7 +198,7 @@ def carried(trace: Trace) -> list[tuple[Indices, Array]]:
 
 def contacts(trace: Trace, places: Array, rows: Indices, reach: float, *, planar: bool) -> Contacts:
     """Pairs of a position and a part of a barrier within a distance, m; positions (K, 3), m, along a path."""
-    # Barriers that move are taken where they are at each of the K rows; those that are absent there count for nothing.
+    # Moving barriers are taken at their places at each of the K rows; absent ones are ignored.
     parts = parts_of(trace)
     near_parts = list[Contacts]()
     for some, origin in carried(trace):
@@ -255,7 +255,7 @@ def least_gap(trace: Trace, pair: Pair) -> Gap:
 
 def start_margin(trace: Trace, pair: Pair) -> float:
     """Margin of a pair's bodies to their distance when both first exist, m; inf if none is needed."""
-    # Commands that were given before then lead a body with a delay on for that time, so its way counts, too.
+    # Earlier commands move a body with a delay for that time, so its way counts, too.
     if pair.under_way_s is None:
         return inf
     until = trace.t[pair.row] + pair.under_way_s - MERGE_S
@@ -293,7 +293,7 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
         best = min(approaches).distance_m if approaches else inf
         if lower[k] > best:
             break
-        for parts in (min(FEW_PARTS, most), most):  # few tell of most segments that the least distance is elsewhere
+        for parts in (min(FEW_PARTS, most), most):  # a few suffice to exclude most segments
             shares = np.linspace(0.0, 1.0, parts + 1)
             places = [bent(trace, name, pair.row + k, shares) for name in (pair.first, pair.second)]
             fine = places[0] - places[1]
@@ -393,7 +393,7 @@ def _beside(trace: Trace) -> dict[str, dict[str, Pair]]:
 @per_trace
 def apart_of(trace: Trace) -> Array:
     """A lower bound of the distance of each pair, as of `Pair.safe_m`, over the run: (P,), m, as in `pairs_of`."""
-    # Obstacles count as there all the time.
+    # Obstacles count as present all the time.
     robots, parts = trace.robots, parts_of(trace)
     off = {robot: off_m_of(trace, robot) for robot in robots}
     bounds_m = dict[tuple[str, str], float]()
@@ -434,7 +434,7 @@ def preset_of(trace: Trace, ugv: str) -> tuple[Array, float]:
 
 def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
     """Positions of the robots among `names` at a time, and their velocities just after it."""
-    # Of a barrier it is the point of its core that is nearest to the first of these robots.
+    # For a barrier it is the point of its core nearest to the first of these robots.
     t, given = trace.t, list(names)
     row = min(int(np.searchsorted(t, t_s + MERGE_S)), len(t) - 1)
     moving = [name for name in given if name in trace.robots]
@@ -452,7 +452,7 @@ def snapshot(trace: Trace, names: Iterable[str], t_s: float) -> dict[str, Any]:
 
 
 CENTRE = Cores.at(np.zeros((1, 3)))  # the core of a robot, as seen from its place
-# Segments in which a body that does not move straight may be too near are divided until they are this straight, m.
+# Segments of curved motion that may be too near are divided until they are straight within this, m.
 BENT_M = 1e-10
 MOST_PARTS = 5000  # parts of such a segment at most
 FEW_PARTS = 50  # parts into which it is divided first

@@ -47,7 +47,7 @@ class Periods(NamedTuple):
     apart_m: Array  # D at that row, (K,), m
     normal: Array  # away from the nearest point of the obstacle, (K, 3)
     keeps_m: float  # d + V h, m
-    missed_m: Array  # how far the robot misses the passive law, (K,), m per period; 0: it is met
+    missed_m: Array  # violation of the passive law by the robot, (K,), m per period; 0: it is met
     too_fast: Flags  # whether the obstacle moves faster than it is expected to, (K,)
     velocity: Array  # of the robot, (K, 3), m/s
 
@@ -109,7 +109,7 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
                 far = away_from(core, seen - there, planar=planar).distance >= sure
                 of_part = np.where(far, np.minimum(of_part, as_seen), of_part)
             missed = np.maximum(missed, of_part)
-    missed = np.maximum(missed - pair.slip_m, 0.0)  # for which the law keeps more
+    missed = np.maximum(missed - pair.slip_m, 0.0)  # for which the law keeps a larger distance
     moved = np.linalg.norm(np.diff(origin, axis=0), axis=1)
     lasting = np.diff(trace.t[around])
     return Periods(
@@ -152,11 +152,11 @@ def beside_moving(trace: Trace) -> list[dict[str, Any]]:
             "too_fast_s": float(trace.t[period_ends(trace)[over[0]]]) if len(over) else None,
             "too_fast_m_s": float(speed[over[0]]) if len(over) else None,
             "periods": len(periods.row),
-            # all hypotheses were met: the distance is proved whatever the obstacle does within its declared speed
+            # all hypotheses were met: the distance is proved for every motion of the obstacle within its declared speed
             "kept_periods": int(periods.kept.sum()),
-            # too near for that: the robot did not bring itself nearer
+            # too near for that: the robot did not reduce the distance
             "passive_periods": int(periods.passive.sum()),
-            # of these: so fast that all that was lost is the obstacle's motion above its declared speed
+            # of these: the whole loss is the obstacle's motion above its declared speed
             "retreating_periods": int(periods.retreated.sum()),
             "standing_periods": int(periods.stood.sum()),
             "e_m": float(periods.missed_m.max(initial=0.0)),

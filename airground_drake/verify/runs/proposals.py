@@ -25,7 +25,7 @@ class ProposalRecord:
     ugv: str  # the UGV that gets it
     policy: str  # the policy that made it
     issued_s: float  # time of sending
-    times_s: Array  # times of the vertices of the motion that it asks for, (M,)
+    times_s: Array  # times of the vertices of the proposed motion, (M,)
     positions_m: Array  # the vertices, (M, 3)
     selection: Array  # J_int of (12)-(14), (m, 3)
     mapped: Array  # outlines of the obstacles on the UAV's map, (k, W), see `model.geometry.outline`
@@ -94,7 +94,7 @@ class Acceptance(NamedTuple):
     on: ProposalRecord  # the proposal
     t_s: float  # when it was accepted
     end_s: float  # when the UGV gave it back, or the gatekeeper's first sample at which it was withdrawn
-    until_s: float  # when it must be over: its motion has ended, or it has lasted as long as it may
+    until_s: float  # its latest end: its motion has ended, or it has lasted as long as allowed
     given_back: bool  # whether the UGV ended it
     # When the UGV sensed an obstacle for the first time that was not on the proposal's map, s.
     news_s: tuple[float, ...]
