@@ -2,16 +2,19 @@
 
     python benchmarks/environment.py
     python benchmarks/environment.py case_a lab --seconds 20
+    pip install vmas && python benchmarks/environment.py --vmas
 
 An agent proposes two random waypoints, or nothing in one request of four. A reset begins an episode on a model that
 exists already; its time excludes the periods up to the first request. A new course needs a new model. `side by side`
-are `ENVIRONMENTS` environments by our vector environment, and in brackets by Gymnasium's loop over single ones. Times
-are of the CPU, of one process with one thread.
+are `ENVIRONMENTS` environments by our vector environment, and in brackets by Gymnasium's loop over single ones.
+`--vmas` adds the scenario `navigation` of VMAS with as many agents, alone and as batches of `ENVIRONMENTS` and
+`BATCH`. Times are of the CPU, of one process with one thread.
 """
 
 import argparse
 import os
 import time
+from importlib import import_module
 from pathlib import Path
 
 os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
@@ -29,7 +32,7 @@ from airground_drake.study.environments.sources import Source
 
 DEFAULT = ("case_a", "case_b", "warehouse", "crossing")
 CAMPAIGN = Path(__file__).parents[1] / "examples" / "learned.yaml"
-RESETS, ENVIRONMENTS = 20, 16
+RESETS, ENVIRONMENTS, BATCH = 20, 16, 1024
 
 
 def played(source: Source, number: int, rng: np.random.Generator) -> tuple[float, int, float]:
@@ -79,11 +82,24 @@ def side_by_side(envs: VectorEnv, period_s: float, seconds: float) -> float:
     return simulated / period_s / (time.process_time() - began)
 
 
+def of_vmas(agents: int, environments: int, seconds: float) -> float:
+    """Steps per second of CPU time, over all environments, of a scenario of VMAS with random actions."""
+    import_module("torch").set_num_threads(1)
+    made = import_module("vmas").make_env("navigation", num_envs=environments, device="cpu", n_agents=agents, seed=1)
+    made.reset()
+    steps, began = 0, time.process_time()
+    while time.process_time() - began < seconds:
+        made.step([made.get_random_action(agent) for agent in made.agents])
+        steps += environments
+    return steps / (time.process_time() - began)
+
+
 def main() -> None:
     """Print a line per scenario, and one about new courses."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenarios", nargs="*", default=DEFAULT, help=f"default: {' '.join(DEFAULT)}")
     parser.add_argument("--seconds", type=float, default=10.0, help="CPU time per scenario (default: 10)")
+    parser.add_argument("--vmas", action="store_true", help="a scenario of VMAS beside each of ours")
     given = parser.parse_args()
     for name in given.scenarios:
         scenario = load(name)
@@ -104,6 +120,9 @@ def main() -> None:
             f"{requests / len(done):.1f} requests per episode, "
             f"reset {np.median(resets):.1f} ms (worst {max(resets):.1f})"
         )
+        if given.vmas:
+            steps = [of_vmas(len(scenario.ugvs), n, given.seconds / 2.0) for n in (1, ENVIRONMENTS, BATCH)]
+            print("    VMAS, steps per second: {:.0f} alone, {:.0f} and {:.0f} in batches".format(*steps))
     courses = Source(load_spec(CAMPAIGN))
     times_ms(courses, range(1))
     fresh, again = (times_ms(courses, range(1, 1 + RESETS)) for _ in range(2))

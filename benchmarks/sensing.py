@@ -28,9 +28,9 @@ from airground_drake.base.parallel import run_parallel
 from airground_drake.model.plants.budget import Bounds, law_distance, least_gain
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.schema import Scenario, Sensing
+from airground_drake.scenario.sensing import Errors
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
-from airground_drake.sim.blocks.sensing import Errors
 from airground_drake.sim.simulation import simulate
 from airground_drake.verify import judge
 

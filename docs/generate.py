@@ -107,7 +107,7 @@ def gallery(scenarios: Sequence[str] = ()) -> str:
         runs = [run for run, spec in scenario.runs.items() if spec.composition == "augmented"]
         lines += ["", f"## {html.escape(scenario.title or name, quote=False)}", "", '<div class="gallery">']
         for run in dict.fromkeys((runs[0], runs[-1])):
-            drawn = thumbnail_of(simulate(scenario, run), f"{name}-{run}")
+            drawn = thumbnail_of(simulate(scenario, run, engine="batch"), f"{name}-{run}")
             says = METHODS[scenario.runs[run].method].says
             lines.append(f"<figure>{drawn}<figcaption>Run {run}: {says}</figcaption></figure>")
         lines += ["</div>", "", f"    airground report {name}"]

@@ -17,7 +17,7 @@ import inspect
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
@@ -140,12 +140,12 @@ class Registry:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            why = _misfit(kind, parameters) or described(error)
+            why = misfit(kind, parameters) or described(error)
             raise PluginError(f"{self.kind} {name!r} with {parameters}: {why}") from None
 
     def misfit(self, name: str, parameters: Mapping[str, Any]) -> str:
         """Why the class refuses these parameters, and those that it takes; '' if it takes them, or is third-party."""
-        return "" if self.is_foreign(name) else _misfit(self.load(name, object), parameters)
+        return "" if self.is_foreign(name) else misfit(self.load(name, object), parameters)
 
     @contextmanager
     def adding(self, name: str, what: type) -> Iterator[None]:
@@ -157,10 +157,10 @@ class Registry:
             self._added = before
 
 
-def _misfit(kind: type, parameters: Mapping[str, Any]) -> str:
-    """Why a class refuses these parameters, and those that it takes; '' if it accepts them or has no signature."""
+def misfit(make: Callable[..., object], parameters: Mapping[str, Any]) -> str:
+    """Why a class or function refuses these parameters, and which it takes; '' if it accepts all, or is unknown."""
     try:
-        signature = inspect.signature(kind)
+        signature = inspect.signature(make)
     except (TypeError, ValueError):
         return ""
     try:

@@ -87,6 +87,7 @@ def safe_own(run: Run) -> Found | None:
     longest = max(float(step.max()) for step in step_m.values())
     for pair in run.pairs:
         keeps = pair.in_the_law.passive(period).safe_m - pair.cover_m
+        keeps = pair.safe_m if pair.error_m and not pair.moves_m_s else keeps
         closing = pair.closing_m_s * period
         there = run.there(pair.other)
         both = rows[there.start : there.stop - 1]
@@ -160,26 +161,30 @@ class Shortfall(NamedTuple):
         return self.own + self.other
 
 
-def shortfall_m(own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1)) -> Fraction:
+def shortfall_m(
+    own_m: Array, other_m: Array, pair: Pair, gain: Fraction, last: Fraction = Fraction(1), seen_m: Array | None = None
+) -> Fraction:
     """The largest violation of a pair's inequalities at one sample, m per period, in exact arithmetic."""
-    # own_m, other_m: (K + 1, 3)
+    # own_m, other_m: (K + 1, 3); seen_m: see `shortfalls_m`
     # gain: A h.
     # last: length of the last period, in periods; its step is extended to a whole one.
     periods = len(own_m) - 1
     lasts = [Fraction(1)] * (periods - 1) + [last]
-    missed = shortfalls_m(own_m, other_m, pair, [pair.safe_m] * periods, [gain] * periods, lasts)
+    missed = shortfalls_m(own_m, other_m, pair, [pair.safe_m] * periods, [gain] * periods, lasts, seen_m)
     return max((shortfall.both for shortfall in missed.values()), default=Fraction())
 
 
 def shortfalls_m(
     own_m: Array, other_m: Array, pair: Pair, safe_m: Sequence[float], gain: Sequence[Fraction],
-    lasts: Sequence[Fraction] = (),
+    lasts: Sequence[Fraction] = (), seen_m: Array | None = None,
 ) -> dict[int, Shortfall]:  # fmt: skip
     """Violations of a pair's inequalities, by period, for the periods with a violation."""
     # There is an inequality for each convex part of what is avoided; the largest shortfall counts. Samples at which the
     # two cannot meet within a period, whatever their direction, need none.
     # own_m, other_m: (K + 1, 3); safe_m, gain: (K,)
     # lasts: divisors of the steps of each period, (K,); by default 1.
+    # seen_m: where the robot was measured, (K, 3). Beside an obstacle that may move, one that is safe_m away as
+    # measured, less the error, may meet the inequality of that place instead.
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
     lasts = lasts or [Fraction(1)] * len(reach)
     reach /= np.array([float(last) for last in lasts])
@@ -200,6 +205,12 @@ def shortfalls_m(
                 [a - b for a, b in zip(after, here, strict=True)],
             )
             own, other = min(_missed_m(away, [axis / lasts[k] for axis in step], *given) for away in ways), Fraction()
+            if seen_m is not None and own:
+                sure = Fraction(safe_m[k]) + Fraction(pair.error_m)
+                place = [Fraction(c) - b for c, b in zip(seen_m[k].tolist(), there, strict=True)]
+                for away in part.away(place):
+                    if away.beyond >= sure * _root(sum((c * c for c in away.vector), Fraction()))[1]:
+                        own = min(own, _missed_m(away, [axis / lasts[k] for axis in step], sure, *given[1:]))
             if pair.share < 1.0:  # a robot is a point: there is one way
                 step = [(a - b) / lasts[k] for a, b in zip(beyond, there, strict=True)]
                 other = _missed_m(Away([-c for c in ways[0].vector], ways[0].beyond), step, *given)
@@ -263,7 +274,8 @@ def safe_hyp(run: Run) -> Found:
             lasting = float(run.t_s[rows[-1]] - run.t_s[rows[-2]])
             last = Fraction(1) if abs(lasting - period) <= SMALL else Fraction(lasting) / Fraction(period)
             if pair.moves_m_s:
-                missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last)) - pair.slip_m
+                seen = run.seen_m(pair.robot)[np.searchsorted(run.sample_row, rows[:-1])] if pair.error_m else None
+                missed = float(shortfall_m(own, other, law.passive(period), Fraction(), last, seen)) - pair.slip_m
                 about = f"{pair.robot}, {pair.other}"
                 holds("passive law", missed <= SMALL, missed, "0 m missed", about=about)
             elif pair.error_m or pair.halved:
@@ -330,7 +342,7 @@ def _constants(run: Run) -> None:
         holds("sensing range", reach >= least, float(reach), f"{float(least)} at least", about=about)
         start = np.inf if pair.moves_m_s else pair.shape.least_m(run.steered_apart(pair)[:1])
         holds("safe start", start >= pair.safe_m - SMALL, start, f"{pair.safe_m} at least", about=about)
-        if pair.error_m:
+        if pair.error_m and not pair.moves_m_s:
             kept = pair.safe_m - pair.error_m - pair.drift_m
             bears = float(gain_of_pair(pair, gain)) * (pair.error_m + kept) - pair.error_m
             holds("gain for errors", bears >= -SMALL, bears, "0 m at least", about=about)

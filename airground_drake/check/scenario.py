@@ -54,8 +54,8 @@ class Pair(NamedTuple):
         return self._replace(gap_m=self.gap_m + self.more_m) if self.more_m else self
 
     def passive(self, period_s: float) -> Pair:
-        """This pair with d + V h in place of d."""
-        return self._replace(gap_m=self.gap_m + self.moves_m_s * period_s)
+        """This pair with d + V h in place of d; in the law errors of measured positions are left out."""
+        return self._replace(gap_m=self.gap_m - self.error_m + self.moves_m_s * period_s)
 
 
 class Levels(NamedTuple):

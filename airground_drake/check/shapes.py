@@ -64,6 +64,12 @@ class Part:
         step, least_m = end - start, np.minimum(*at_m)
         bound = 0.5 * (at_m[0] + at_m[1] - np.linalg.norm(step, axis=1)) - ROUNDING_M
         steps = np.flatnonzero(~(bound >= reach_m))
+        if len(self.corners) == 1 and self.base_m == self.top_m:  # nearest to a point where the way is across
+            to, way = np.array([*self.corners[0], self.base_m]) - start[steps], step[steps]
+            square = (way**2).sum(axis=1)
+            share = np.clip((to * way).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+            least_m[steps] = np.minimum(least_m[steps], self.signed_m(start[steps] + share[:, None] * way))
+            return least_m
         low, high = np.zeros(len(steps)), np.ones(len(steps))
         for _ in range(THIRDS if len(steps) else 0):  # a convex function has its least value beside the lower of two
             left, right = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0

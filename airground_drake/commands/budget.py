@@ -28,6 +28,7 @@ USUAL = {"_s": (0.0, 0.1, 0.3, 1.0), "_m": (0.0, 0.02, 0.05, 0.1), "": (0.0, 0.1
 PROMISED, LAW, OLD = "promised_m", "law_m", "old_positions_m"  # columns about a kind of pair
 MEANING = "metres, by kind of pair: the distance promised between surfaces -> the distance that the law keeps"
 MEANING_OF_OLD = "; + the way of the other one: nearer than both, two UGVs may only part"
+EXIT_UNDECIDED = 3
 MOST_NAMED = 6  # bodies that are named in a line at most
 
 
@@ -47,6 +48,7 @@ def parser() -> Parser:
             "--set": None,
             plugins.OPTION: None,
         },
+        "exit codes: 0 distances are printed, 2 usage or bad scenario, 3 with --vary, nothing was judged",
     )
 
 
@@ -103,7 +105,7 @@ def _vary(scenario: Scenario, options: argparse.Namespace) -> int:
         print(json.dumps(rows.astype(object).where(rows.notna(), None).to_dict("records"), indent=1))
     else:
         print(_as_text(rows, key))
-    return 0
+    return 0 if (rows["ended"] == JUDGED).any() else EXIT_UNDECIDED
 
 
 def _costs(scenario: Scenario, key: str, value: object) -> dict[str, float]:

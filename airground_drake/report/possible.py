@@ -1,6 +1,7 @@
-"""What a run of a scenario cannot have had: messages, positions heard, executions and references.
+"""What a run of a scenario cannot have had: messages, positions heard or measured, executions and references.
 
-The fate of a message follows from the scenario alone, so no run is simulated for this.
+The fate of a message follows from the scenario alone, and an error of a measured position from it and true positions,
+so no run is simulated for this.
 """
 
 import math
@@ -15,18 +16,20 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.report.lines import Line, different
 from airground_drake.scenario.links import make_links
 from airground_drake.scenario.schema import Channel, Scenario
+from airground_drake.scenario.sensing import errors_of
+from airground_drake.scenario.world import make_world
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.channel import Message, Transit, lost
 from airground_drake.verify.claim import TIME_TOLERANCE_S as SAME_S
 
 CORNER_S = 1e-9  # a velocity so near to a corner of its preset, s, may be that of either side
-SAME_M_S = 1e-9
+SAME_M_S = SAME_M = 1e-9
 Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and as it is due
 
 
 def impossible(trace: Trace, scenario: Scenario) -> Iterator[Line]:
     """A line for the first thing that cannot have been so."""
-    for rule in (_referred, _spoken, _carried, _heard, _executed):
+    for rule in (_referred, _spoken, _carried, _heard, _measured, _executed):
         for about, t_s, theirs, ours in rule(trace, scenario):
             yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
             return
@@ -119,6 +122,26 @@ def _heard(trace: Trace, scenario: Scenario) -> Wrong:
         theirs, ours = trace.sampled(f"{receiver}.heard_{sender}_s"), due[:, i, j]
         for k in np.flatnonzero(~(np.abs(theirs - ours) <= SAME_S))[:1]:
             yield f"last position of {sender} that {receiver} has", float(t_s[k]), float(theirs[k]), float(ours[k])
+
+
+def _measured(trace: Trace, scenario: Scenario) -> Wrong:
+    """What robots publish, and where UAVs see UGVs, is off by the errors that the scenario draws."""
+    world, t_s = make_world(scenario), trace.sampled("t_s")
+    errors = errors_of(scenario, world)
+    if errors is None or (scenario.faults and scenario.faults.late):
+        return
+    true = np.stack([trace.position(body.name)[trace.sample_rows] for body in world.moving], axis=1)
+    published, seen = (
+        np.array([measured(t, places) for t, places in zip(t_s, true, strict=True)])
+        for measured in (errors.published, errors.seen_by_uav)
+    )
+    for i, ugv in enumerate(trace.ugvs if scenario.announces else ()):  # measured a period ago, and a step
+        published[1:, i] = published[:-1, i] + scenario.control.period_s * trace.chosen(ugv)[:-1]
+    for stem, robots, due in (("seen", trace.robots, published), ("uav_saw", trace.ugvs, seen)):
+        for i, robot in enumerate(robots):
+            theirs = np.column_stack([trace.sampled(f"{robot}.{stem}_{axis}_m") for axis in "xyz"])
+            for k in np.flatnonzero(~(np.abs(theirs - due[:, i]).max(axis=1) <= SAME_M))[:1]:
+                yield f"position of {robot} as measured ({stem}), m,", t_s[k], theirs[k].tolist(), due[k, i].tolist()
 
 
 def _executed(trace: Trace, scenario: Scenario) -> Wrong:

@@ -277,7 +277,7 @@ def _threshold(report: Report, rows: Sequence[Row]) -> Iterator[Check]:
         says = [f"{counted(fired, 'trigger')} at {zeta:.3g} m ({rules.THRESHOLDS.get(rule, rule)})"]
         if not fired:
             most = [ugv["largest_decision_variable_m"] for claim in exact for ugv in claim.evidence.get("ugvs", ())]
-            says += [f"{value:.3g} m reached" for value in sorted(most)[-1:]]
+            says += [f"{round(value, 9):.3g} m reached" for value in sorted(most)[-1:]]
             mark = "none" if mark == "yes" else mark
         says += [f"{sum(entry['counts'][kind] for entry in timed)} {kind}" for kind in ("false", "missed") if timed]
         off_s = [abs(entry[kind]["late_s"]) for entry in timed for kind in ("latest", "earliest") if entry[kind]]

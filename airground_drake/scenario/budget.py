@@ -84,7 +84,7 @@ def budget(scenario: Scenario) -> Iterator[PairBudget]:
         ]
         law = float(law_distance(promised + radii, *both, gain=gain, passive=passive))
         start = _start(bounds[first], promised, law - radii) if kind == "obstacle" and appears.get(second) else ""
-        least = least_gain(promised + radii, *both)
+        least = 0.0 if passive else least_gain(promised + radii, *both)
         fastest = max(bounds[name].speed_m_s for name in (first, second)) if kind == "ugv" else 0.0
         unsure = scenario.unsure_s * fastest
         return PairBudget(first, second, kind, promised, radii, law, tuple(terms), start, least, unsure)

@@ -334,7 +334,8 @@ class Sensing:
     The law keeps a larger distance to allow for the errors (`airground budget`), and robots stand still if measured
     inequalities contradict one another. 'drawn' errors change smoothly. The other errors are at the bound: the nearest
     body appears farther away ('away') or in another direction ('sideways'); 'adversarial' chooses one of them at random
-    every half second. With obstacles that may move, a scenario with measured positions is refused.
+    every half second. Positions of obstacles are exact; beside an obstacle that may move, a robot only moves in
+    directions that cannot bring it nearer whatever the error, or stands still.
     """
 
     position_error_m: NotNegative = 0.0
@@ -812,6 +813,12 @@ class Scenario:
         """The UGVs that a UAV is in charge of, in their order."""
         listed = self.aerial[uav].ugvs
         return tuple(ugv for ugv in self.ugvs if ugv in listed or not listed)
+
+    @property
+    def lost_s(self) -> dict[str, float]:
+        """When the UAV in charge of each UGV is lost, s, by UGV in their order; infinite: never."""
+        lost = {ugv: robot.lost_at_s or math.inf for uav, robot in self.aerial.items() for ugv in self.in_charge(uav)}
+        return {ugv: lost[ugv] for ugv in self.ugvs}
 
     def kind_of(self, name: str) -> Kind:
         """What the body of this name is.

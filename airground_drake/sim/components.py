@@ -52,12 +52,6 @@ def make_law(scenario: Scenario, method: Method, composition: Composition = "aug
     return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
 
 
-def lost_at(scenario: Scenario) -> list[float]:
-    """Time at which the UAV of each UGV is lost, s; infinite: never."""
-    lost = {ugv: scenario.aerial[uav].lost_at_s or np.inf for uav in scenario.aerial for ugv in scenario.in_charge(uav)}
-    return [lost[ugv] for ugv in scenario.ugvs]
-
-
 def repeats_after(scenario: Scenario) -> float:
     """Time after which an unanswered message is repeated, s; infinite without a channel."""
     if scenario.channel is None:

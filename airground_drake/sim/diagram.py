@@ -5,7 +5,7 @@ Data flows through `decision_making` (noise, DDM, trigger), `task_planning` (pre
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -14,7 +14,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Mult
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, ScenarioError, UnknownNameError, short
+from airground_drake.base.errors import PluginError, ScenarioError, UnknownNameError, described, raised_as, short
 from airground_drake.base.registry import METHODS, UAV_TASKS, Method, method_of
 from airground_drake.model.bodies.kinds import ROBOTS
 from airground_drake.model.bodies.world import World
@@ -23,7 +23,8 @@ from airground_drake.model.law.avoidance import COMPOSITIONS, Composition
 from airground_drake.model.law.task import Task
 from airground_drake.scenario.links import make_links
 from airground_drake.scenario.load import validated
-from airground_drake.scenario.schema import Faults, Scenario
+from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.sensing import errors_of
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import (
@@ -44,7 +45,7 @@ from airground_drake.sim.blocks import (
 from airground_drake.sim.blocks.own_controller import ControllerFactory, OwnUgvController
 from airground_drake.sim.blocks.plant import OwnPlant, declared, plant_system
 from airground_drake.sim.blocks.positions import positions_between
-from airground_drake.sim.blocks.sensing import Errors, PositionSensing
+from airground_drake.sim.blocks.sensing import PositionSensing
 from airground_drake.sim.blocks.signals import inputs_of, outputs_of
 
 # Exported output ports of the diagram: the signals of a trace.
@@ -181,11 +182,10 @@ def build_model(
     if channel:
         down, up = make_links(channel)
         start, sent = next(iter(plans.values())).start(), _named("sent", plans).values()
-        links = Downlink(down, sent, start, period, retry, components.lost_at(scenario)), Uplink(up, period)
+        links = Downlink(down, sent, start, period, retry, [*scenario.lost_s.values()]), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}
-    if scenario.sensing:
-        error_m = scenario.position_error_m + (scenario.faults or Faults()).position_error_m
-        parts["sensing"] = PositionSensing(Errors(replace(scenario.sensing, position_error_m=error_m), world), world)
+    if errors := errors_of(scenario, world):
+        parts["sensing"] = PositionSensing(errors, world)
     parts |= between.parts
     if monitor is not None:
         parts["monitor"] = monitor
@@ -366,13 +366,14 @@ def _assembled(
         wanted = renamed.get(port.get_system(), NO_NAMES).get(port.get_name(), port.get_name())
         if builder.IsConnectedOrExported(port):
             continue
-        if wanted in named:
-            builder.Connect(named[wanted], port)
-        elif wanted in inputs:
-            builder.ConnectInput(wanted, port)
-        else:
-            builder.ExportInput(port, wanted)
-            inputs.add(wanted)
+        with raised_as(lambda error: PluginError(described(error))):  # a user's block may have ports of other sizes
+            if wanted in named:
+                builder.Connect(named[wanted], port)
+            elif wanted in inputs:
+                builder.ConnectInput(wanted, port)
+            else:
+                builder.ExportInput(port, wanted)
+                inputs.add(wanted)
     for key in named if exported is None else exported:
         builder.ExportOutput(named[key], key)
     return _built(name, builder)

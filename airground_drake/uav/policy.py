@@ -223,10 +223,11 @@ def motions_of(proposed: object, seen: Observation) -> dict[str, Motion]:
     taken = {mate.name for mate in seen.team if mate.proposal is not None and mate.proposal.issued == seen.t}
     motions = {}
     for name, motion in list(proposed.items()):
-        if not isinstance(motion, Motion):
-            raise TypeError(f"a policy proposes a Motion, Motions by UGV or None, not {type(motion).__name__}")
         if not isinstance(name, str) or name not in known:
             raise ValueError(f"a policy proposes to UGVs in the UAV's charge, not to {name!r}")
+        if not isinstance(motion, Motion):
+            given = f"{type(motion).__name__} for {name}"
+            raise TypeError(f"a policy proposes a Motion, Motions by UGV or None, not {given}")
         if name in taken:
             raise ValueError(f"{name} has a proposal of this instant already")
         plain = Motion(motion.times, motion.positions)

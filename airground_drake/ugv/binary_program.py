@@ -118,7 +118,7 @@ class BinaryProgram:
 def _may_bind(stage: Indices, of_omega: Array, lower: Array) -> Flags:
     """Which half-planes can determine the slack of their stage for some plan, relaxed or not."""
     # A row asks for the slack lower - of_omega . omega, (rows,). Over omega in [0, 1] the least difference of two rows
-    # is found term by term.
+    # is found term by term, none of which adds to it.
     kept = np.ones(len(lower), dtype=np.bool_)
     for j in range(len(lower)):
         most = lower[j]
@@ -130,6 +130,8 @@ def _may_bind(stage: Indices, of_omega: Array, lower: Array) -> Flags:
                 continue
             more = lower[i] - lower[j]
             for b in range(of_omega.shape[1]):
+                if more < 0.0:
+                    break
                 more += min(0.0, of_omega[j, b] - of_omega[i, b])
             kept[j] = more < 0.0
     return kept

@@ -37,7 +37,7 @@ WORDS: dict[Reason, Words] = {
     ),
     "makes_way": Words("the UGV makes way for another one and still reaches its goal"),
     "exhausted": Words("the UGV has used all of its tries and has not rested since", "it had used all of its tries"),
-    "over": Words("the time of the proposal is over"),
+    "over": Words("the time of the proposal is over", "its time was over"),
 }
 
 

@@ -124,7 +124,7 @@ class Workspace(NamedTuple):
 @njit(cache=True)
 def workspace(loop: ClosedLoop) -> Workspace:
     """Arrays for `advance`, uninitialised but for the heading."""
-    count = len(loop.distances) + len(loop.parts) + EDGES
+    count = 2 * len(loop.distances) + EDGES
     plane = np.array([1.0, 1.0, 0.0])
     which, normal, bound, retreat = np.empty(count, np.intp), np.empty((count, 3)), np.empty(count), np.empty(count)
     return Workspace(plane, which, normal, bound, retreat, np.empty(3), np.empty(3), np.full(1, loop.heading))

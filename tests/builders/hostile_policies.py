@@ -194,6 +194,7 @@ KINDS: dict[str, Kind] = {
     "class_has_no_name": tame(NO_WORDS, lambda seen: throw(Nameless("Nothing", (Exception,), {})("?"))),
     # proposes nonsense
     "returns_text": tame("TypeError: a policy proposes a Motion, .* not str", lambda seen: "left"),
+    "returns_none_for_a_ugv": tame("TypeError: .* not NoneType for ", lambda seen: {seen.robot: None}),
     "returns_a_huge_motion": tame(
         "ValueError: a proposal of [0-9]+ bytes", lambda seen: Motion(np.arange(1e6), np.zeros((10**6, 3)))
     ),

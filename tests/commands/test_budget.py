@@ -79,7 +79,7 @@ def test_third_party_code_is_not_imported(
     asked, own = ["minimal", "d", "--jobs", "1", "--set", "duration_s=0.5"], "{name: 'evil.py:Evil'}"
     with pytest.raises(ScenarioError, match="only with --allow-plugins"):
         main([*asked, "--vary", "control.period_s=0.05", "--set", f"intervention.policies=[{own}]"])
-    assert main([*asked, "--json", "--vary", f"intervention.policies=[{own}]"]) == 0
+    assert main([*asked, "--json", "--vary", f"intervention.policies=[{own}]"]) == 3
     (row,) = json.loads(capsys.readouterr().out)
     assert row["ended"] == "invalid"
     assert "only with --allow-plugins" in row["what"]

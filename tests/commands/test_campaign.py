@@ -30,6 +30,7 @@ def spec(tmp_path: Path) -> Path:
     return tmp_path / "small.yaml"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("in_this_process")
 def test_it_runs_goes_on_and_says_what_it_found(spec: Path, tmp_path: Path, airground: Airground) -> None:
     out = tmp_path / "out"

@@ -136,9 +136,14 @@ def roll_out(trace: Trace, scenes: Scene, nudge: Array | float = 0.0) -> Iterato
         bound = least_speeds(distance, scenes.safe, scenes.share, control, scenes.speed)
         retreat = retreats(distance, scenes.safe, scenes.speed, h)
         given = Inequalities(normal * PLANE, bound, retreat if retreat.any() else None)
-        if (old := scenes.share < 0.0).any():
-            given = given._replace(bound=np.where(old, -np.inf, bound))
-            given = given.also(*towards_old(normal, distance, scenes.safe, np.where(old, -scenes.share, 0.0), h))
+        unsure = np.where(scenes.speed > 0.0, trace.scenario.position_error_m, -np.minimum(scenes.share, 0.0))
+        if (old := unsure > 0.0).any():
+            safe = scenes.safe + np.where(scenes.speed > 0.0, scenes.speed * h - unsure, 0.0)
+            given = given._replace(
+                bound=np.where(old, -np.inf, bound), retreat=None if given.retreat is None else retreat * ~old
+            )
+            both_sides = np.concatenate([retreat * old, retreat * old], axis=1)
+            given = given.also(*towards_old(normal, distance, safe, unsure, h), both_sides)
         given = given.also(*edges(heading, scenes.numbers))
         own = tracking(place, scenes.preset[:, k], rates[:, k], control.motion_gain_1_s, scenes.limit)
         rows = np.flatnonzero(scenes.executed[:, k])

@@ -36,8 +36,9 @@ class Inequalities(NamedTuple):
     bound: Array
     retreat: Array | None = None
 
-    def also(self, normal: Array, bound: Array) -> "Inequalities":
-        retreat = None if self.retreat is None else np.concatenate([self.retreat, np.zeros_like(bound)], axis=1)
+    def also(self, normal: Array, bound: Array, more: Array | None = None) -> "Inequalities":
+        more = np.zeros_like(bound) if more is None else more
+        retreat = None if self.retreat is None else np.concatenate([self.retreat, more], axis=1)
         both = (np.concatenate(parts, axis=1) for parts in ((self.normal, normal), (self.bound, bound)))
         return Inequalities(*both, retreat)
 

@@ -52,9 +52,14 @@ NOISY = (
 )
 
 
-@pytest.mark.parametrize("scenario", ["swap", "pocket"])
-def test_a_run_with_errors_of_positions_over_a_channel_has_no_fault(scenario: str) -> None:
-    assert not faults_of(simulate(load(scenario, [*NOISY, "duration_s=14"]), "d"))
+@pytest.mark.parametrize(("scenario", "gain", "duration_s"), [("swap", 3, 14), ("pocket", 3, 14), ("crowd", 20, 6)])
+def test_a_run_with_errors_of_positions_over_a_channel_has_no_fault(
+    scenario: str, gain: float, duration_s: float
+) -> None:
+    given = [*NOISY, f"control.avoidance_gain_1_s={gain}", f"duration_s={duration_s}"]
+    trace = simulate(load(scenario, given), "d")
+    assert len(trace.decisions)
+    assert not faults_of(trace)
 
 
 DOOR = """

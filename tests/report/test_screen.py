@@ -313,8 +313,9 @@ def test_threshold() -> None:
         found["runs"]["d"]["zeta_m"] = 0.0311
         found["scenario"]["resolved"]["runs"]["d"]["set"] = {"decision.threshold.rule": "printed"}
 
-    reached = judged("THR-TRIG", evidence={"ugvs": [{"largest_decision_variable_m": 0.4}]})
-    assert checks("Threshold correct?", reached) == [("none", "0 triggers at 1 m (set by hand), 0.4 m reached")]
+    for value_m, told in ((0.4, "0.4"), (2.22e-15, "0")):
+        reached = judged("THR-TRIG", evidence={"ugvs": [{"largest_decision_variable_m": value_m}]})
+        assert checks("Threshold correct?", reached) == [("none", f"0 triggers at 1 m (set by hand), {told} m reached")]
     assert checks("Threshold correct?", timed, lower) == [
         ("none", "0 triggers at 1 m (set by hand)"),
         ("no", "1 trigger at 0.0311 m (by (19) as printed), 1 false, 2 missed, at most 0.03 s off"),

@@ -308,7 +308,6 @@ TOGETHER = [
         for more in (
             ["control.avoidance_gain_1_s=3.6"],
             ["control.avoidance_gain_1_s=0"],
-            ["obstacles.stone={position_m: [30, 30, 0], max_speed_m_s: 0.1}"],
             [DRIFTS],
             [PRINTED],
             ["ugvs.ugv2.start_m=[-6, 1.1, 0]"],

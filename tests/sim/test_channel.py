@@ -32,8 +32,9 @@ def over(given: Channel | None, scenario: str = "lab", run: str = "d", *more: st
 
 
 @pytest.mark.parametrize(("scenario", "name", "more"), [
-    ("case_b", "b", ()), ("case_b", "c", ()), ("case_b", "d", ()), ("doorway", "d", ()),
-    ("two_uavs", "d", ("uavs.south.lost_at_s=0", "duration_s=16")),
+    ("case_b", "b", ()), ("case_b", "c", ()), ("case_b", "d", ()),
+    pytest.param("doorway", "d", (), marks=pytest.mark.slow),
+    pytest.param("two_uavs", "d", ("uavs.south.lost_at_s=0", "duration_s=16"), marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_a_channel_that_does_nothing_changes_nothing(scenario: str, name: str, more: tuple[str, ...]) -> None:
     without, silent = over(None, scenario, name, *more), over(Channel(), scenario, name, *more)
@@ -62,6 +63,7 @@ CHANNELS = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(given_=CHANNELS, run=st.sampled_from("bcdd"), period_s=st.sampled_from([0.05, 0.2]))
 @examples(6, 500)
 def test_whatever_the_channel_does_the_protocol_is_kept(given_: Channel, run: str, period_s: float) -> None:
@@ -74,6 +76,7 @@ def test_whatever_the_channel_does_the_protocol_is_kept(given_: Channel, run: st
         assert {verdicts[claim] for claim in ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP")} == {"holds"}
 
 
+@pytest.mark.slow
 @given(given_=CHANNELS, lost_at_s=st.sampled_from([0.0, 8.4, 9.13, 11.0]), run=st.sampled_from("bdd"))
 @examples(2, 200)
 def test_with_two_uavs_the_protocol_is_kept(given_: Channel, lost_at_s: float, run: str) -> None:

@@ -79,8 +79,9 @@ class Neighbours(NamedTuple):
         still: outlines of the parts at rest, (m, W).
         parts: outlines of all parts that move, about the origins of their bodies, (P, W).
         distance: distances that the law keeps between the robot's steered point and the cores, (k, m + n), m.
-        share: part of the avoidance inequality that the robot takes, (k, m + n). Below 0 the law is the asynchronous
-            one, and it is minus how far the other one may be from its old position until it decides again, m.
+        share: part of the avoidance inequality that the robot takes, (k, m + n). Below 0 it is minus how far the other
+            one may be from where the robot believes it to be, m: of a UGV from its old position until it decides again
+            (the law is the asynchronous one), of an obstacle that may move by the error of a measured position.
         mobility: of the robots, (k, 3), 1 where they can move, else 0.
         max_speed: of the robots, (k,), m/s.
     """
@@ -254,16 +255,20 @@ class World:
         ]).reshape(others.shape)  # fmt: skip
         return Neighbours(
             members, carrier, others, self.still, parts, np.array(distance).reshape(len(members), -1),
-            np.hstack([np.ones((len(members), len(self.still))), share]),
+            np.hstack([np.reshape([self._shares(robot, self.still) for robot in robots], (len(robots), -1)), share]),
             _rows([robot.mobility for robot in robots]), np.array([robot.max_speed_m_s for robot in robots]),
         )  # fmt: skip
 
     def _share(self, robot: Body, other: Body) -> float:
         """The share of the inequality that a robot takes beside a moving body; negative as in `Neighbours`."""
         if other.kind not in ROBOTS:
-            return 1.0
+            return float(self._shares(robot, other.shape[:1])[0])
         unsure_m = self.unsure_s * other.max_speed_m_s if robot.kind == other.kind == "ugv" else 0.0
         return -unsure_m or 0.5
+
+    def _shares(self, robot: Body, rows: Array) -> Array:
+        """The parts of inequalities that a robot takes beside obstacles (m, W): (m,)."""
+        return np.where(rows[:, outline.SPEED] > 0.0, -robot.error_m or 1.0, 1.0)
 
     def keep(self, robot: int, rows: Array) -> Array:
         """Distances that the law keeps between a robot's steered point and the cores of obstacles (m, W): (m,), m."""

@@ -21,6 +21,9 @@ distance that the other one can drive from its old position, D away, until it de
     n.v >= -(D - d - rho) / h  if D >= d + rho;
     D n.v >= rho ||v||         otherwise: away from every place where it can be. In the plane these are two half-planes.
 
+Where measured positions may be off by e, D is the measured distance and d has e in it (`model.plants.budget`); nearer
+than d + V h the robot leads away from every place where the obstacle can be, D n.v >= e ||v||, or stands.
+
 Below these inequalities, and above all other tasks, it retreats: n.v >= V - (D - d) / h, as far as its speed limit
 allows. D and d are distances of the robot's centre from the *core* of
 what it avoids (`model.geometry.outline`): `World` puts both radii into d.
@@ -95,7 +98,7 @@ class Avoidance:
     def half_spaces(self, positions: Array, near: Neighbours) -> HalfSpaces:
         """Constraints of k robots with the moving bodies at positions (M, 3) m."""
         if (near.share < 0.0).any():
-            raise ValueError("old positions ask for two constraints; wanted: bodies that share inequalities")
+            raise ValueError("positions that are not sure ask for two constraints; wanted: sure ones")
         count = near.distance.shape[1]
         half_spaces = HalfSpaces(np.zeros((len(near.members), count, 3)), np.full((len(near.members), count), -np.inf))
         which, normal, (bound, retreat) = np.empty(count, dtype=np.intp), np.empty((count, 3)), np.empty((2, count))

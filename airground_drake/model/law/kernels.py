@@ -47,16 +47,18 @@ class Layer(NamedTuple):
 
 @njit(cache=True)
 def fill_half_spaces(
-    position: Array,
-    mobility: Array,
-    still: Array,
-    parts: Array,
-    carrier: Indices,
-    others: Indices,
-    places: Array,
-    distance: Array,
-    share: Array,
+    position: Array,  # of the robot, (3,), m
+    mobility: Array,  # of the robot, (3,), see `Neighbours`
+    still: Array,  # outlines at rest, (m, W)
+    parts: Array,  # outlines that move, (P, W)
+    carrier: Indices,  # rows in `places` of the bodies of the parts, (P,)
+    others: Indices,  # the n of these parts that the robot keeps away from, (n,)
+    places: Array,  # of the bodies that move, (M, 3), m
+    distance: Array,  # safe distances from the cores, (m + n,), m
+    share: Array,  # shares of the inequalities, (m + n,); with one below 0 (see `Neighbours`) there may be two
     layer: Layer,
+    # Results, (2 (m + n), ...), of which the first K entries count. `which` is about what, static outlines first;
+    # normal . v >= bound, m/s; `retreat` is the speed away that the robot should have, m/s, 0 if it need not retreat.
     which: Indices,
     normal: Array,
     bound: Array,
@@ -66,23 +68,6 @@ def fill_half_spaces(
 
     Of each distance (7) these are the value D, (1), the Jacobian, (2), which is the unit vector n away from what is
     avoided, and from these a bound on n.v, (8) as an inequality.
-
-    Args:
-        position: of the robot, (3,), m.
-        mobility: of the robot, (3,), see `Neighbours`.
-        still: outlines at rest, (m, W).
-        parts: outlines that move, (P, W).
-        carrier: rows in `places` of the bodies of the parts, (P,).
-        others: the n of these parts that the robot keeps away from, (n,).
-        places: positions of the bodies that move, (M, 3), m.
-        distance: safe distances from the cores, (m + n,), m.
-        share: shares of the inequalities, (m + n,); below 0 as in `Neighbours`.
-        layer: the numbers of the layer.
-        which: result, (m + 2 n,): the first K entries say what the constraints are about, counting what is at rest
-            first.
-        normal: result, (m + 2 n, 3); the first K rows.
-        bound: result, (m + 2 n,), m/s; the first K entries.
-        retreat: result, (m + 2 n,), m/s: speeds away that the robot should have, 0 where it need not retreat.
     """
     gain, period, reach, planar = layer.gain, layer.period, layer.sensing_range, mobility[2] == 0.0
     x, y, z = position[0], position[1], position[2]
@@ -91,25 +76,30 @@ def fill_half_spaces(
         if k < m:
             if not may_be_within(still, k, x, y, reach):
                 continue
+            speed = still[k, SPEED]
             apart = nearest(still[k], x, y, z, planar, normal[count], reach)
         else:
             part = others[k - m]
-            origin = carrier[part]
+            origin, speed = carrier[part], parts[part, SPEED]
             px, py, pz = places[origin, 0], places[origin, 1], places[origin, 2]
-            if share[k] < 0.0:
-                which[count], which[count + 1] = k, k
-                count = _keep_off(x - px, y - py, distance[k], -share[k], period, normal, bound, retreat, count)
-                continue
             apart = nearest(parts[part], x - px, y - py, z - pz, planar, normal[count], reach)
-        if apart > reach:
+        old = share[k] < 0.0 and speed == 0.0  # an old position counts at whatever distance
+        if apart > reach and not old:
             continue
         for a in range(3):
             normal[count, a] *= mobility[a]
         which[count], retreat[count], excess = k, 0.0, apart - distance[k]
-        speed = still[k, SPEED] if k < m else parts[others[k - m], SPEED]
         if speed > 0.0:
-            bound[count] = min(-(excess - speed * period) / period, 0.0)
             retreat[count] = max(speed - excess / period, 0.0)
+            excess -= speed * period
+        elif old:
+            excess += share[k]
+        if share[k] < 0.0 and excess < 0.0:
+            which[count + 1] = k
+            _lead_away(apart, -share[k], planar, normal, bound, retreat, count)
+            count += 1
+        elif speed > 0.0 or old:
+            bound[count] = min(-excess / period, 0.0)
         else:
             bound[count] = -share[k] * gain * excess if excess <= 0.0 else -share[k] * excess / period
         count += 1
@@ -117,28 +107,23 @@ def fill_half_spaces(
 
 
 @njit(cache=True, inline="always")
-def _keep_off(
-    x: float, y: float, distance: float, unsure: float, period: float, normal: Array, bound: Array, retreat: Array,
-    count: int,
-) -> int:  # fmt: skip
-    """Add the constraints of a UGV that is at (x, y), m, as seen from an old position of another one."""
-    apart = np.sqrt(x * x + y * y)
-    if apart > unsure:
-        x, y = x / apart, y / apart
-    excess, sine, cosine = apart - distance - unsure, 1.0, 0.0
-    if excess < 0.0:  # a cone about the direction away, which is two half-planes; none if it has no inside
-        cosine = min(unsure / max(apart, 1e-300), 1.0)
-        sine = np.sqrt(1.0 - cosine * cosine)
-    for side in range(1 if excess >= 0.0 else 2):
-        turned = cosine if side == 0 else -cosine
-        normal[count, 0], normal[count, 1], normal[count, 2] = sine * x - turned * y, sine * y + turned * x, 0.0
-        retreat[count], bound[count] = 0.0, 0.0
-        if excess >= 0.0:
-            bound[count] = -excess / period
-        elif sine == 0.0:  # no velocity meets both: the robot stands
-            normal[count, 0], normal[count, 1], bound[count] = 1.0 - 2.0 * side, 0.0, 1.0
-        count += 1
-    return count
+def _lead_away(
+    apart: float, unsure: float, planar: bool, normal: Array, bound: Array, retreat: Array, count: int
+) -> None:
+    """Turn constraint `count`, whose normal leads away from a place, into two that lead away from all places near it.
+
+    D n.v >= unsure ||v||, with the distance D = `apart` from the place, m: in the plane a cone between two half-planes.
+    Where it has no inside, and in space, the two contradict each other, so that the robot stands.
+    """
+    cosine = min(unsure / max(apart, 1e-300), 1.0) if planar else 1.0
+    sine = np.sqrt(1.0 - cosine * cosine)
+    x, y = normal[count, 0], normal[count, 1]
+    for side in range(2):
+        k, turned = count + side, cosine if side == 0 else -cosine
+        normal[k, 0], normal[k, 1], normal[k, 2] = sine * x - turned * y, sine * y + turned * x, 0.0
+        bound[k], retreat[k] = 0.0, retreat[count]
+        if sine == 0.0:
+            normal[k, 0], normal[k, 1], bound[k] = 1.0 - 2.0 * side, 0.0, 1.0
 
 
 @njit(cache=True)
@@ -230,7 +215,7 @@ def commands(lower: Array, positions: Array, near: Neighbours, layer: Layer) -> 
     # Reading an array of a named tuple within the loop would count references.
     members, carrier, others, still, parts, distance, share, mobility, max_speed = near
     velocity = limit_speed(lower, max_speed)
-    most = distance.shape[1] + others.shape[1]
+    most = 2 * distance.shape[1]
     normal, bound, which, retreat = np.empty((most, 3)), np.empty(most), np.empty(most, np.intp), np.empty(most)
     for i in range(len(velocity)):
         count = fill_half_spaces(

@@ -180,7 +180,7 @@ def commands(
     target, rate = track
     wanted, wanted_rate, chosen = asked
     velocity = np.empty(target.shape)
-    most = distance.shape[1] + others.shape[1] + EDGES
+    most = 2 * distance.shape[1] + EDGES
     normal, bound, which, retreat = np.empty((most, 3)), np.empty(most), np.empty(most, np.intp), np.empty(most)
     for i in range(len(target)):
         ugv = UgvState(positions[members[i]], mobility[i], max_speed[i])

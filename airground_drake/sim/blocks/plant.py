@@ -25,8 +25,8 @@ from pydrake.systems.primitives import LinearSystem, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.base.arrays import Array
-from airground_drake.base.errors import PluginError, UnknownNameError, described, short
-from airground_drake.base.registry import PLANTS, Registry
+from airground_drake.base.errors import PluginError, UnknownNameError, described, raised_as, short
+from airground_drake.base.registry import PLANTS, Registry, misfit
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.bodies.world import Body
 from airground_drake.model.plants.own import Own, OwnKeys
@@ -294,12 +294,13 @@ def users_system(
     about: str, registry: Registry, name: str, make: Callable[..., System] | None, **parameters: Any
 ) -> System:
     """A user's plant or controller, from a class or a function, or else from the class of a name in the scenario."""
-    if make is None:
-        return registry.make(name, System, **parameters)
-    try:
-        system: Any = make(**parameters)
-    except Exception as error:  # the user's code may raise anything
-        raise PluginError(f"{about}: {described(error, code_of(name, make).function)}") from error
+    made = registry.load(name, System) if make is None else make
+
+    def refused(error: BaseException) -> PluginError:
+        return PluginError(f"{about}: {misfit(made, parameters) or described(error, code_of(name, made).function)}")
+
+    with raised_as(refused):
+        system: Any = made(**parameters)
     if not isinstance(system, System):
         raise PluginError(f"{about} is made by a function that returns {short(repr(system))}; allowed: a Drake System")
     return system

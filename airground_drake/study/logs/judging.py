@@ -254,7 +254,7 @@ def _judged(
     eps = errors_m.get(pair.robot, 0.0) + errors_m.get(pair.other, 0.0)  # a body that is not in the log has no error
     spans = _common(own, other)
     if not spans:
-        times = (f"{n} {t.t_s[0]:.6g} to {t.t_s[-1]:.6g} s" for n, t in ((pair.robot, own), (pair.other, other)))
+        times = (f"{n} {t.t_s[0]:.12g} to {t.t_s[-1]:.12g} s" for n, t in ((pair.robot, own), (pair.other, other)))
         wanted = f"wanted: logs of the same time, or --without {pair.robot}"
         raise LogError(f"{' and '.join(times)} are never recorded at the same time; {wanted}")
     least, at, stretch = np.inf, 0.0, spans[0]

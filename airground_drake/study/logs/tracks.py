@@ -12,6 +12,7 @@ from airground_drake.base.errors import LogError
 from airground_drake.check.files import Json
 from airground_drake.check.limits import LARGEST
 from airground_drake.check.scenario import expected_m_s, robots_of, uavs_of
+from airground_drake.report.sentences import counted
 from airground_drake.study.logs import axes, units
 from airground_drake.study.logs.stream import (
     OF_MESSAGES,
@@ -302,7 +303,7 @@ def _track(
     if not (np.abs(np.nan_to_num(places)) <= LARGEST).all():
         raise LogError(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres")
     for reason, count in stream.skipped.items():
-        said.append(f"{name}: {count} rows skipped, {reason}{_where(stream, reason)}")
+        said.append(f"{name}: {counted(count, 'row')} skipped, {reason}{_where(stream, reason)}")
     _of_one_recording(name, ns, places, fastest_m_s)
     if disorder := int((np.diff(ns) < 0).sum()):
         said.append(f"{name}: rows are not in the order of time in {disorder} places; they were sorted")
@@ -313,7 +314,7 @@ def _track(
     apart = np.linalg.norm(np.nan_to_num(places - places[first]), axis=1)
     same, other = (~new) & (apart <= SAME_M), (~new) & (apart > SAME_M)
     if same.any():
-        said.append(f"{name}: {int(same.sum())} rows come twice; each counts once")
+        said.append(f"{name}: {counted(int(same.sum()), 'row')} repeated; each counts once")
     if other.sum() > CONTRADICTORY * len(ns):
         raise LogError(
             f"{name}: {int(other.sum())} of {len(ns)} rows are elsewhere at the same time as another row; "
@@ -329,7 +330,7 @@ def _track(
     lost = _lost(t_s, places, fastest_m_s, start)
     if lost.any():
         said.append(
-            f"{name}: {int(lost.sum())} rows skipped, where it cannot have been: taken as lost, first at "
+            f"{name}: {counted(int(lost.sum()), 'row')} skipped, where it cannot have been: taken as lost, first at "
             f"{t_s[lost][0]:.6g} s"
         )
     t_s, places = t_s[~lost], places[~lost]

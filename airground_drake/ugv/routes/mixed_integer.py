@@ -20,6 +20,8 @@ from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cheape
 _AGREE = 1e-6  # costs that differ by less than this, relative, are equal: the solver's tolerances and ours
 # Another search is made only if the relaxation comes nearer to the plan than this, relative: it is long otherwise.
 _WORTH = 0.02
+# A search has this share of the time at first: within it, nearly every one ends or is longer than may count.
+_FIRST = 0.125
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,8 @@ class MixedIntegerRoute:
 
     Budget: only the clock can stop DAQP during a search, but it says how many iterations it took. If all searches
     together take more than `search_iterations`, or the time `search_s` is up, or the solver fails, the best plan so far
-    decides. It does not depend on the clock. If no search ended, its bound is that of the relaxation.
+    decides. It does not depend on the clock: a search that is stopped early, and has not taken too many iterations, is
+    made again with all of the time. If no search ended, its bound is that of the relaxation.
     """
 
     def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
@@ -105,10 +108,13 @@ class _Searches:
         problem, normals = binary.problem, binary.normals
         costs = [problem.evaluate_half_planes(plan.positions, normals) for plan in known]
         best = int(np.argmin(costs))
-        seconds = min(self._until - time.monotonic(), self._budget.left_s())
-        if seconds <= 0.0:
-            return _Proof("budget_spent", relaxed, normals)
-        result = self._search.minimise(binary, binary.guess(known[best]), seconds)
+        for share in (_FIRST, 1.0):
+            seconds = share * min(self._until - time.monotonic(), self._budget.left_s())
+            if seconds <= 0.0:
+                return _Proof("budget_spent", relaxed, normals)
+            result = self._search.minimise(binary, binary.guess(known[best]), seconds)
+            if result.ended != "budget_spent" or result.iterations > self._iterations:
+                break
         self._iterations -= result.iterations
         status: Status = result.ended if self._iterations >= 0 else "budget_spent"
         if result.omega is None or status != "optimal":

@@ -160,7 +160,7 @@ class SafeBudget(TheoremClaim):
             margin = max(kept, 0.0) - pair["safe_m"]
             holds = margin * pair["safe_m"] >= -ROUNDED_M * pair["law_m"]  # rounding in the law
             yield Hypothesis(self.margin_of, says, margin, "m", holds)
-            if error_m:
+            if error_m and not passive:
                 least = least_gain(pair["safe_m"], *both)
                 says = f"{pair['first']}, {pair['second']}: A h = {share:.6g} bears the errors, at least {least:.6g}"
                 yield Hypothesis("A h less what errors ask for", says, share - least, "1", share >= least)

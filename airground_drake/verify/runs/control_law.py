@@ -52,18 +52,18 @@ def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Arr
     return np.where(speed > 0.0, np.maximum(speed - (distance - safe) / period_s, 0.0), 0.0)
 
 
-def _towards_old(
-    normal: Array, bound: Array, distance: Array, safe: Array, unsure: Array, period_s: float
+def _towards_unsure(
+    normal: Array, bound: Array, distance: Array, excess: Array, unsure: Array, period_s: float, *, planar: bool
 ) -> tuple[Indices, Array, Array]:
-    """The inequalities, with those for old positions in their own form: origins, normals, bounds."""
-    # Within d + rho of an old position the velocity stays in a cone, between two lines in the plane; without a way that
-    # surely leads off no velocity is allowed: two inequalities contradict each other.
-    excess, k = distance - safe - unsure, np.arange(len(bound))
+    """The inequalities, with those for uncertain places in their own form: origins, normals, bounds."""
+    # Too near to such a place the velocity stays in a cone, between two lines in the plane. If no direction is sure to
+    # lead away no velocity is allowed: the two inequalities contradict each other.
+    k = np.arange(len(bound))
     bound = np.where(unsure > 0.0, -excess / period_s, bound)
     cone = (unsure > 0.0) & (excess < 0.0)
     rows = np.concatenate([k[~cone], k[cone], k[cone]])
     side = np.repeat([0.0, 1.0, -1.0], [(~cone).sum(), cone.sum(), cone.sum()])
-    cosine = np.abs(side) * np.minimum(unsure[rows] / np.maximum(distance[rows], 1e-300), 1.0)
+    cosine = np.abs(side) * (np.minimum(unsure[rows] / np.maximum(distance[rows], 1e-300), 1.0) if planar else 1.0)
     normal, bound = normal[rows], np.where(cone[rows], 0.0, bound[rows])
     sine, turned = np.sqrt(1.0 - cosine**2), np.stack([-normal[:, 1], normal[:, 0], np.zeros(len(rows))], axis=1)
     normal = sine[:, None] * normal + (side * cosine)[:, None] * turned
@@ -103,9 +103,12 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     when = np.append(near.place, sample)
     number = np.array([trace.robots.index(name) for name in others], dtype=np.intp)
     column = np.append(near.core, len(parts.owner) + number[other])
+    unsure = np.append(np.where(speed[: len(near.core)] > 0.0, trace.scenario.position_error_m, 0.0), unsure)
     if unsure.any():
-        unsure = np.append(np.zeros(len(near.core)), unsure)
-        k, normal, bound = _towards_old(normal, bound, distance, safe, unsure, control.period_s)
+        excess = distance - safe - np.where(speed > 0.0, speed * control.period_s, unsure)
+        k, normal, bound = _towards_unsure(
+            normal * (PLANE if planar else 1.0), bound, distance, excess, unsure, control.period_s, planar=planar
+        )
         when, column, distance, retreat = when[k], column[k], distance[k], retreat[k]
     moves = np.array([trace.scenario.barriers[name].moves is not None for name in parts.names], dtype=np.bool_)
     rank = np.concatenate([np.where(moves[parts.owner], 2, 0), np.ones(len(trace.robots), dtype=np.intp)])

@@ -45,7 +45,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
         for i, j in ((first, second), (second, first)):
             if i >= len(barriers):  # a barrier does not avoid others
                 i -= len(barriers)
-                safe[i, j], share[i, j] = pair.law_m, pair.share
+                safe[i, j], share[i, j] = pair.law_m, -pair.error_m if pair.error_m and pair.speed_m_s else pair.share
                 if pair.asynchronous:
                     share[i, j] = -late_s * scenario.ugvs[robots[j - len(barriers)]].max_speed_m_s
     outlines = [*outlines_of(trace)]

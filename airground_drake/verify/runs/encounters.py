@@ -35,6 +35,7 @@ from airground_drake.verify.runs.pairs import (
 )
 from airground_drake.verify.runs.passive import AT_LIMIT_M_S, STANDING_M_S, Periods, periods_of
 
+SHOWN_M_S = 0.005  # a sentence shows a smaller speed as 0.00 m/s: the robot stood
 BLOCKED_M_S = 1e-6  # an inequality blocks a retreat if the retreat would miss it by more than this, m/s
 
 
@@ -82,7 +83,8 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     origin = origin_of(trace, other)
     planar = is_planar(trace, robot)
     # Errors of measured positions may use up all that the law keeps beyond d.
-    keeps = pair.safe_m if pair.error_m else pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m
+    keeps = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m
+    keeps = pair.safe_m if pair.error_m and not pair.speed_m_s else keeps
     off_m = off_m_of(trace, robot)
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
@@ -219,7 +221,8 @@ def _steered_nearer(trace: Trace, pair: Pair, robot: str) -> bool:
     before, after = (
         over_time(cores, trace.position(robot)[at] - origin[rows[:-1]], planar=planar) for at in (rows[:-1], rows[1:])
     )
-    keeps_m = pair.safe_m if pair.error_m else pair.keeps_m(trace.scenario.control.period_s)
+    by_law = pair.keeps_m(trace.scenario.control.period_s)
+    keeps_m = pair.safe_m if pair.error_m and not pair.speed_m_s else by_law
     return bool((after < np.minimum(before, keeps_m) - DISTANCE_TOLERANCE_M).any())
 
 
@@ -236,7 +239,7 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) 
     periods, t_s = periods_of(trace, pair), encounter.t_s
     before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
     k = int(before[-1])
-    given = inequalities_of(trace, pair.first)
+    given = inequalities_of(trace, pair.first, as_seen=trace.scenario.sensing is not None)
     number = np.searchsorted(trace.sample_rows, periods.row)
     blocked = [_blocked_by(trace, pair, periods, period, given, int(number[period])) for period in before.tolist()]
     short = gaps[periods.row[before]] < pair.required_m - DISTANCE_TOLERANCE_M
@@ -261,7 +264,7 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) 
 
 def _reaction(speed: float, away: float, limit: float) -> str:
     """A robot's reaction in words, from its speed, its speed away from the obstacle, and its limit, m/s."""
-    if speed <= STANDING_M_S:
+    if speed < SHOWN_M_S:
         return "stood"
     if away <= STANDING_M_S:
         return "moved aside"

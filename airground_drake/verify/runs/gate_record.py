@@ -18,7 +18,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
-from airground_drake.verify.runs.proposals import GATED_METHODS, silent, talk_is_due, unreached, without_proposals
+from airground_drake.verify.runs.proposals import GATED_METHODS, talk_is_due, unreached, without_proposals
 
 # Recorded and recomputed positions may differ by this, m: rounding of N additions errs by 1e-13 m.
 POSITION_TOLERANCE_M = 1e-9
@@ -251,7 +251,8 @@ class GateClaim(TraceClaim):
             return Finding("not_run", evidence={"reason": "the problems of the decisions were not recorded"})
         without = without_decisions(trace)
         if without and not len(trace.decisions):
-            return silent(trace, without, "decision")
+            reason = f"{', '.join(without)}: in mode 'intervening', but the trace has no decision"
+            return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
         rows = trace.derived("rows", lambda: rows_of(trace))
         if not rows:
             reason = "no UGV had a proposal for long enough: nothing to decide"

@@ -79,8 +79,8 @@ class Pair(NamedTuple):
         return self.safe_m + self.more_m
 
     def keeps_m(self, period_s: float) -> float:
-        """`law_m` plus V h: with this distance at a sample, d is kept for a period whatever the barrier does."""
-        return self.law_m + self.speed_m_s * period_s
+        """`law_m` less errors, plus V h: with it at a sample, d is kept for a period whatever the barrier does."""
+        return self.law_m - self.error_m + self.speed_m_s * period_s
 
 
 class Gap(NamedTuple):

@@ -1,10 +1,12 @@
 """Robots beside obstacles that may move, period by period: distances and reactions.
 
 A robot keeps n.v >= -(D - d - V h) / h, or n.v >= 0 if D < d + V h: then it is *passive*. Any loss below min(D, d + V
-h) is due to the obstacle's own motion.
+h) is due to the obstacle's own motion. With a measured distance D' and errors up to e, the first inequality may hold
+for D' - e in place of D, if D' - e >= d + V h (theorem Passive.own_doing, `advances`).
 """
 
 from fractions import Fraction
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +15,7 @@ from airground_drake.base.arrays import Array, Flags, Indices
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import away_from
-from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, shortfalls
+from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortfalls
 from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, Pair, cores_of, is_planar, origin_of, pairs_of
 
 STANDING_M_S = 1e-9  # a robot that is commanded no more than this stands, m/s
@@ -95,8 +97,18 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
         for part in range(len(cores.base)):
             core = POINT if cores.are_points else cores.take(part)
             place = origin + cores.points[part] if cores.are_points else origin
-            asked = Fraction(1), Fraction(0), last
-            missed = np.maximum(missed, shortfalls(first, place, keeps, *asked, core, planar=planar, held=True))
+            missing = partial(
+                shortfalls, first, place, share=Fraction(1), gain=Fraction(0), last=last, core=core, planar=planar,
+                held=True,
+            )  # fmt: skip
+            of_part = missing(d=keeps)
+            if pair.error_m and of_part.any():
+                seen, there = trace.as_seen(pair.first, pair.first)[which], np.broadcast_to(place, first.shape)[:-1]
+                sure = rounded_up(Fraction(keeps) + Fraction(pair.error_m))
+                as_seen = missing(d=sure, seen=(seen, there))
+                far = away_from(core, seen - there, planar=planar).distance >= sure
+                of_part = np.where(far, np.minimum(of_part, as_seen), of_part)
+            missed = np.maximum(missed, of_part)
     missed = np.maximum(missed - pair.slip_m, 0.0)  # for which the law keeps a larger distance
     moved = np.linalg.norm(np.diff(origin, axis=0), axis=1)
     lasting = np.diff(trace.t[around])

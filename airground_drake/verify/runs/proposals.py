@@ -1,6 +1,6 @@
 """Recorded proposals of a run, their acceptances, and the interventions on UGVs."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby, zip_longest
 from typing import Any, NamedTuple
@@ -12,7 +12,6 @@ from airground_drake.base.errors import TraceError
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import unpacked
-from airground_drake.verify.finding import Finding
 
 METHOD = "d"  # only this method has tries and rests, and predicts where an accepted intervention leads
 GATED_METHODS = ("c", "d")  # methods with an optimising gatekeeper
@@ -144,9 +143,10 @@ def intervening(trace: Trace, ugv: str) -> Array:
 
 
 def talk_is_due(trace: Trace, ugv: str) -> bool:
-    """Whether an intervention on a UGV lasts longer than a proposal and a decision take."""
-    periods = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
-    return bool((np.diff(intervening(trace, ugv)) > periods).any())
+    """Whether a UAV with policies, not lost, intervenes on a UGV for longer than a proposal and a decision take."""
+    given = trace.scenario
+    spells = np.minimum(intervening(trace, ugv), given.lost_s[ugv] if given.intervention.policies else 0.0)
+    return bool((np.diff(spells) > given.intervention.period_s + given.gatekeeper.period_s).any())
 
 
 def without_proposals(trace: Trace) -> list[str]:
@@ -182,9 +182,3 @@ def reasons(trace: Trace) -> dict[str, str]:
     said = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
     lost = [*without_proposals(trace), *lost_at_the_end(trace)]
     return {ugv: str(said[ugv]) for ugv in dict.fromkeys(lost) if ugv in said.index}
-
-
-def silent(trace: Trace, ugvs: Iterable[str], kind: str) -> Finding:
-    """The finding `not_run`: there were interventions, but no message of a kind was recorded."""
-    reason = f"{', '.join(ugvs)}: in mode 'intervening', but the trace has no {kind}"
-    return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})

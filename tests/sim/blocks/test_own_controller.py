@@ -74,6 +74,12 @@ class Unfed(Straight):
         self.DeclareVectorInputPort("lidar", 1)
 
 
+class Narrow(Straight):
+    def sample(self, period_s: float) -> None:
+        super().sample(period_s)
+        self.DeclareVectorInputPort("bodies", 3 * self.count)
+
+
 class AtOnce(LeafSystem):
     def __init__(self, world: World, law: UgvLaw) -> None:
         super().__init__()
@@ -151,7 +157,13 @@ def test_a_class_that_the_scenario_does_not_name_does_not_pass_for_a_controller(
         (Filtered, PluginError, "has continuous or abstract state; allowed: discrete state"),
         (Unfed, PluginError, r"has an input port 'lidar'; allowed: answers, bodies, .*, reference"),
         (AtOnce, PluginError, "output port command that depends on its inputs at once"),
-        (NoMap, PluginError, r"controller '.*NoMap': test_own_controller\.py:\d+ FileNotFoundError: no map"),
+        (Narrow, PluginError, r"port bodies of System ugv_controller \(size 3\) to .* \(size 6\)$"),
+        (
+            f"{__name__}:NoMap",
+            PluginError,
+            r"^controller '\S*NoMap': test_\w+\.py:\d+ FileNotFoundError: no map$",
+        ),
+        (lambda world: 3, PluginError, r"': got an unexpected keyword argument 'law'; allowed: world \(needed\)$"),
         (lambda world, law: 3, PluginError, "is made by a function that returns 3; allowed: a Drake System"),
         (lambda world, law: ConstantVectorSource([0.0]), PluginError, "output ports of sizes {'y0': 1}"),
         (3, PluginError, "ugv_controller is 3; allowed: a subclass of Drake's System, or a function"),
@@ -162,8 +174,9 @@ def test_a_class_that_the_scenario_does_not_name_does_not_pass_for_a_controller(
     ],
 )
 def test_a_controller_that_fails_says_which_and_why(make: Any, error: type[Exception], said: str) -> None:
+    by_name = {"ugv_controller": {"kind": make}} if isinstance(make, str) else {}
     with pytest.raises(error, match=said):
-        simulate(load("minimal", SETTINGS), "d", ugv_controller=make)
+        simulate(load("minimal", SETTINGS | by_name), "d", ugv_controller=None if by_name else make)
 
 
 def test_unicycles_need_the_share_of_each_command() -> None:

@@ -16,11 +16,12 @@ from airground_drake.check import safety
 from airground_drake.model.bodies.world import Body
 from airground_drake.model.law import kernels
 from airground_drake.model.plants.budget import Bounds, costs, kept_distance, law_distance, least_gain
+from airground_drake.report.possible import impossible
 from airground_drake.scenario.budget import budget
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import ERRORS, Scenario
+from airground_drake.scenario.sensing import Errors
 from airground_drake.scenario.world import make_world
-from airground_drake.sim.blocks.sensing import Errors
 from airground_drake.sim.diagram import make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
@@ -29,7 +30,11 @@ from airground_drake.verify import judge, judge_model
 ERROR_M = 0.05
 
 
-def crossing(**sensing: Any) -> Scenario:
+PERSON = {"radius_m": 0.25, "max_speed_m_s": 1.0, "moves": {
+    "waypoints_m": [[2.0, -3.0], [-0.5, 1.0], [2.0, 3.0]], "speed_m_s": 0.9, "at_end": "reverse"}}  # fmt: skip
+
+
+def crossing(others: Any = (), **sensing: Any) -> Scenario:
     def ugv(start: list[float], target: list[float]) -> dict[str, Any]:
         return {"start_m": start, "target_m": target, "preset": {"waypoints_m": [start, target]}, "max_speed_m_s": 2.0}
 
@@ -37,7 +42,7 @@ def crossing(**sensing: Any) -> Scenario:
         "name": "crossing_of_two", "duration_s": 12.0,
         "ugvs": {"ugv1": ugv([-5.0, 0.0, 0.0], [5.0, 0.0, 0.0]), "ugv2": ugv([0.0, -5.0, 0.0], [0.0, 5.0, 0.0])},
         "uav": {"start_m": [-2.5, -2.5, 2.0]},
-        "obstacles": {"rock": {"position_m": [2.5, 0.3, 0.0], "radius_m": 0.3}},
+        "obstacles": {"rock": {"position_m": [2.5, 0.3, 0.0], "radius_m": 0.3}, **dict(others)},
         "safe_distance": {"obstacle_m": 0.6, "ugv_m": 0.6},
         "control": {"period_s": 0.05, "avoidance_gain_1_s": 8.0},
         "decision": {"threshold": {"zeta_m": 1.2}, "release_m": 0.8, "noise_period_s": 0.05},
@@ -90,6 +95,26 @@ def test_a_law_that_does_not_pay_for_errors_is_found(monkeypatch: pytest.MonkeyP
     trace = simulate(crossing(errors="away"), "a")
     assert found(trace, "SAFE-TRACE", "SAFE-HYP") == {"SAFE-TRACE": "refuted", "SAFE-HYP": "refuted"}
     assert safety.safe_hyp(checked(trace)).status == "refuted"
+
+
+@pytest.mark.parametrize("errors", ["away", "sideways"])
+def test_beside_a_person_robots_only_go_where_they_surely_get_no_nearer(
+    errors: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario, claims = crossing({"person": PERSON}.items(), errors=errors), ("SAFE-OWN", "SAFE-HYP")
+    trace = simulate(scenario, "a")  # sideways, one step meets the passive law only as measured
+    verdicts = {verdict.claim.id: verdict for verdict in judge(trace)}
+    assert {verdicts[claim].status for claim in claims} == {"holds"}
+    rows = verdicts["SAFE-HYP"].evidence["beside_moving"]
+    assert sum(row["kept_periods"] for row in rows) > 20 or errors == "away"
+    assert sum(row["passive_periods"] for row in rows) > 5 or errors == "sideways"
+    for ours in (safety.safe_own(checked(trace)), safety.safe_hyp(checked(trace))):
+        assert getattr(ours, "status", "") == "holds"
+    assert [*impossible(trace, scenario)] == []
+    right = Body.bounds.fget  # type: ignore[attr-defined]
+    monkeypatch.setattr(Body, "bounds", property(lambda self: right(self)._replace(error_m=0.0)))
+    wrong = simulate(scenario, "a")
+    assert safety.safe_hyp(checked(wrong)).status == found(wrong, "SAFE-HYP")["SAFE-HYP"] == "refuted"
 
 
 def test_measured_positions_beyond_their_bound_are_found() -> None:

@@ -51,6 +51,10 @@ def test_a_person_who_walks_through_a_robot_is_named_and_the_robot_is_not() -> N
     assert (came["first"], came["second"], came["doing"], came["collided"]) == ("ugv1", "person", "other", True)
 
 
+def test_nobody_retreats_at_a_speed_of_nought() -> None:
+    assert [encounters_module._reaction(speed, speed, 1.0) for speed in (0.0049, 0.0051)] == ["stood", "retreated"]
+
+
 def test_a_robot_that_leaves_its_straight_line_gets_farther_from_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
     trace = persons.run("fork")
     straight = steps_of(trace, "ugv1")
