@@ -57,7 +57,7 @@ def _towards_unsure(
 ) -> tuple[Indices, Array, Array]:
     """The inequalities, with those for uncertain places in their own form: origins, normals, bounds."""
     # Too near to such a place the velocity stays in a cone, between two lines in the plane. If no direction is sure to
-    # lead away nothing is allowed: the two inequalities contradict each other.
+    # lead away no velocity is allowed: the two inequalities contradict each other.
     k = np.arange(len(bound))
     bound = np.where(unsure > 0.0, -excess / period_s, bound)
     cone = (unsure > 0.0) & (excess < 0.0)
