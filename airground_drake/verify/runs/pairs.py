@@ -60,8 +60,8 @@ class Pair(NamedTuple):
     slip_m: float = 0.0  # how much of its command the robot may miss in a control period
     # How far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
     drawn_m: float = 0.0
-    # Duration of commands already given, where the theorem requires a safe start of the bodies, too (with random
-    # position errors, lag or delay); None where it does not.
+    # Duration of commands already given, where the theorem requires a safe start of the bodies, too (they lag, are late
+    # or follow the steered point as a trailer); None where it does not.
     under_way_s: float | None = None
 
     @property
