@@ -81,7 +81,8 @@ FORGERIES: dict[str, tuple[str, Any]] = {
     "sent after the end": ("who sends ", column("messages", "sent_s", lambda f: 1e18)),
     "to another one": ("sending of proposal", column("proposals", "sender", lambda f: "ugv1")),
     "sent earlier": ("sending of proposal", column("proposals", "issued_s", lambda f: f["issued_s"] - 0.05)),
-    "about another one": ("number of the proposal that answer ", column("messages", "about", lambda f: 9, first(kind="answer"))),
+    "about another one": ("number of the proposal that answer ", column(
+        "messages", "about", lambda f: 9, first(kind="answer"))),
     "a repeat about another one": ("number of the proposal that ", column(
         "messages", "about", lambda f: 9, first(attempt=1))),
     "all positions heard": ("last position of ", column("samples", "ugv1.heard_ugv2_s", lambda f: f["t_s"])),
