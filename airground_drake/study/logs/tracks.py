@@ -323,8 +323,8 @@ def _track(
     if other.any():
         k = int(np.argmax(np.where(other, apart, -1.0)))
         said.append(
-            f"{name}: {int(other.sum())} rows contradict an earlier one of the same time, at {ns[k] / 1e9:.6g} s by "
-            f"{apart[k]:.3g} m; the earlier one counts"
+            f"{name}: {counted(int(other.sum()), 'row')} not where an earlier one of the same time is, at "
+            f"{ns[k] / 1e9:.6g} s by {apart[k]:.3g} m; the earlier one counts"
         )
     t_s, places = ns[new] / 1e9, places[new]
     lost = _lost(t_s, places, fastest_m_s, start)

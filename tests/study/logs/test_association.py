@@ -219,9 +219,8 @@ def test_of_two_rows_of_one_time_the_first_counts_and_the_contradiction_is_named
     other = [*rows[k][:3], f"{float(rows[k][3]) - 0.5:.4f}", rows[k][4]]
     found = logs.read(written(tmp_path, [head, *rows[: k + 1], other, *rows[k + 1 :]]), document)
     assert pair_of(judge(found, document).pairs, *BROKEN).least_m == pytest.approx(logs.least_gaps(FULL)[BROKEN][0])
-    assert (
-        "tb_1: 1 rows contradict an earlier one of the same time, at 3 s by 0.5 m; the earlier one counts" in found.said
-    )
+    told = "tb_1: 1 row not where an earlier one of the same time is, at 3 s by 0.5 m; the earlier one counts"
+    assert told in found.said
 
 
 # --- names and frames ------------------------------------------------------------------------------------------------

@@ -399,7 +399,7 @@ FORMS = {
         ("millimetres, as the file says",),
     ),
     "words": Form(table("log.csv", words), FULL),
-    "twice": Form(table("log.csv", twice), FULL, ("uav: 1 rows contradict", "repeated", "not in the order of time")),
+    "twice": Form(table("log.csv", twice), FULL, ("uav: 1 row not where", "repeated", "not in the order of time")),
     "no uav": Form(table("log.csv", lambda: logs.long(logs.motion(("tb_0", "tb_1")))), logs.motion(("tb_0", "tb_1")),
                    ("uav is not in the log",)),
     "parquet": Form(parquet, FULL),
