@@ -34,7 +34,7 @@ def njit(*, cache: bool, **options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _without_constants(template: Callable[..., Any]) -> Callable[..., Any]:
-    """numba's dispatch without constant arguments, for each of which it would compile a function again."""
+    """numba's dispatch, except that it never compiles a function again for a constant argument."""
     return lambda args, named: template(tuple(map(_kind, args)), {name: _kind(of) for name, of in named.items()})
 
 

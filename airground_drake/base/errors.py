@@ -155,7 +155,7 @@ def printable(text: str) -> str:
 
 
 def _place(error: BaseException, function: object) -> str:
-    """The last line of the function's file in the traceback, and a space; '' if there is none."""
+    """The last line of the function's file in the traceback, and a space; '' without such a line."""
     file = getattr(getattr(function, "__code__", None), "co_filename", None)
     lines = [line for frame, line in walk_tb(error.__traceback__) if frame.f_code.co_filename == file]
     return f"{PurePath(str(file)).name}:{lines[-1]} " if lines else ""

@@ -15,7 +15,7 @@ class CheckLine:
     claim: str  # identifier of the claim, or report, files, trace, events
     run: str  # on which run; '' for the report and the model
     outcome: str  # see above
-    text: str  # the result, or why there is none
+    text: str  # the result, or why it cannot be checked
     rule: str = ""  # the rule that is broken or cannot be applied; '' if all agrees
     about: str = ""  # the robot, pair, event, decision or file
     t_s: float | None = None  # when in the run; None where there is no time

@@ -44,7 +44,7 @@ class _Process:
     """A run in a process of its own."""
 
     def __init__(self, scenario: Scenario, name: str, folder: Path, engine: Engine) -> None:
-        """Start the process, which writes its trace to `folder`, or a note why there is none."""
+        """Start the process, which writes its trace, or the reason for failing, to `folder`."""
         context = multiprocessing.get_context("fork") if forks() else multiprocessing.get_context("spawn")
         self._name, self._folder, self._what = name, folder, f"run {name} of {scenario.name}, seed {scenario.seed}"
         self._clock = context.RawValue("d")  # simulated time, s

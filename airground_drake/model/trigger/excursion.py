@@ -37,7 +37,7 @@ class Corners(NamedTuple):
 
     @classmethod
     def of(cls, presets: Sequence[Motion]) -> Corners:
-        """The corners of presets; without presets there are none."""
+        """The corners of presets; no rows without presets."""
         order = sorted((t, j) for j, preset in enumerate(presets) for t in preset.times.tolist())
         return cls(
             np.array([t for t, _ in order], dtype=np.float64),

@@ -296,7 +296,7 @@ class Going:
         return trace_of(batch.scenario, batch.name, batch.world, done, batch.world.signals)
 
     def _signals(self, log: Log) -> Array:
-        """Signals of plants, (T, k): of unicycles from the loop; of others computed afterwards."""
+        """Signals of plants, (T, k); the loop has those of unicycles, the others are computed here."""
         batch, turning = self._batch, iter(np.split(log.signals, log.signals.shape[1] // loop.SIGNALS or 1, axis=1))
         ticks = self._team.ticks[(self._team.due & loop.CONTROL) > 0]
         samples = np.searchsorted(log.t, ticks[ticks <= log.t[-1]], side="right") - 1

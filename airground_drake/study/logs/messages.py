@@ -128,7 +128,7 @@ class Gathered:
         return topic not in self.unused
 
     def add(self, topic: str, kind: str, received_ns: int, message: Any) -> None:
-        """Collect the positions of a message; a topic whose first message has none is unused."""
+        """Collect the positions of a message; a topic is unused if its first message has no position."""
         several = list(places(message))
         if not several and topic not in self.used:
             self.unused[topic] = kind
