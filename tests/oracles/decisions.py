@@ -13,7 +13,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.scenario.schema import Gatekeeper
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.claims.gate_plan import BLOCKS, Bounded, Enclosure, bounds_of_plans, cheapest_of_blocks
+from airground_drake.verify.claims.gate_plan import BLOCKS, Bounded, Enclosure, bound, cheapest_of_blocks
 from airground_drake.verify.engines.geometry import travelled
 from airground_drake.verify.engines.outlines import Cores, away_from
 from airground_drake.verify.runs.control_law import ON_TOP
@@ -213,7 +213,7 @@ def compare_routes(trace: Trace, planned: Sequence[DecisionRecord]) -> Iterator[
             yield Deviation(row, "a relaxation that the route has not", [len(arrays), *numbers], 0.0)
         if row.given["route_bound"] != -1.0 and row.given["status"] == "optimal":
             yield Deviation(row, "a bound without unit normals", float(not row.unit_normals), 0.0)
-    for each in (each for each in bounds_of_plans(trace, planned) if each.row.given["route_bound"] != -1.0):
+    for each in bound([row for row in planned if row.given["route_bound"] != -1.0 and row.unit_normals], blocks):
         yield from compare_bounds(each.row, each.optimum, blocks)
         if each.gap > LARGEST_GAP and not blocks and each.row.given["route"] in PROVED_ROUTES:
             yield compare_with_blocks(each)

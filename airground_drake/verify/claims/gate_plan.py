@@ -112,7 +112,8 @@ class GatePlan(GateClaim):
         compared = [deviation for row in rows for deviation in compare_plan(trace, row)]
         compared += [deviation for row in rounded for deviation in compare_rounding(row)]
         blocks = int(trace.scenario.gatekeeper.blocks)
-        bounded = sorted(bounds_of_plans(trace, rows), key=lambda decision: -decision.gap)
+        bounded = bound([row for row in planned if row.unit_normals], blocks)
+        bounded = sorted(bounded, key=lambda decision: -decision.gap)
         widest = max((decision.width for decision in bounded), default=0.0)
         slack = [float(np.maximum(0.0, -row.clearance(row["positions_m"])).max()) for row in planned]
         beside_all = [above_the_best(row, blocks) for row in planned if min(blocks or row.stages, row.stages) <= BLOCKS]
@@ -285,13 +286,6 @@ class Bounded:
     def first_stage_certified(self) -> bool:
         """Whether no plan with the other first stage can be as cheap as this one."""
         return self.optimum.other_first > self.optimum.lower + self.gap * self.row.scale
-
-
-def bounds_of_plans(trace: Trace, rows: Sequence[DecisionRecord]) -> list[Bounded]:
-    """Bounds for each decision of a run whose plan has half-planes, worked out once."""
-    blocks = int(trace.scenario.gatekeeper.blocks)
-    bounded = [row for row in rows if row.planned and row.unit_normals]
-    return trace.derived("bounds", lambda: bound(bounded, blocks))
 
 
 def bound(rows: Sequence[DecisionRecord], blocks: int) -> list[Bounded]:

@@ -1,7 +1,6 @@
 """What claims about decisions compute, against enumeration, another method or the running code."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -91,7 +90,7 @@ def test_a_bad_solution_gives_no_margin(base: Callable[[str], Trace], monkeypatc
 
     monkeypatch.setattr(gate_plan, "_solve", nothing)
     monkeypatch.setattr(gate_plan, "_minimiser", lambda row, _: np.full(STAGES, 0.5))
-    found = decided("GATE-PLAN", replace(base(RELAXED)))  # with nothing worked out before
+    found = decided("GATE-PLAN", base(RELAXED))
     assert (found.status, found.margin) == ("holds", None)
     assert found.evidence["optimum"].startswith("unknown: the bounds of an optimum are")
 
@@ -102,7 +101,7 @@ def test_the_margin_is_the_largest_gap_and_refutes_nothing(
     bounded = gate_plan.bound(rows_of(base(RELAXED)), 0)
     bounded[1].__dict__["gap"] = 0.4  # a cached property
     monkeypatch.setattr(gate_plan, "bound", lambda rows, blocks: bounded)
-    found = decided("GATE-PLAN", replace(base(RELAXED)))  # with nothing worked out before
+    found = decided("GATE-PLAN", base(RELAXED))
     assert (found.status, found.margin, found.where["t_s"]) == ("holds", 0.4, bounded[1].row.t_s)
 
 
