@@ -125,7 +125,8 @@ def _asynchronous(scenario: Scenario) -> Problems:
         return
     told = "with control.law: asynchronous"
     if scenario.ugv_links is None:
-        yield "control.law", "asynchronous", "shared without channel.ugvs: UGVs then know all positions at once"
+        allowed = "shared, or with a channel.ugvs, such as {}: without it UGVs know all positions at once"
+        yield "control.law", "asynchronous", allowed
     if scenario.sensing is not None:
         yield "sensing", Fault(told), "left out: no theorem is about old positions with errors"
     for run, spec in scenario.runs.items():

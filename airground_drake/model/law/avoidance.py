@@ -98,7 +98,7 @@ class Avoidance:
     def half_spaces(self, positions: Array, near: Neighbours) -> HalfSpaces:
         """Constraints of k robots with the moving bodies at positions (M, 3) m."""
         if (near.share < 0.0).any():
-            raise ValueError("positions that are not sure ask for two constraints; wanted: sure ones")
+            raise ValueError("an uncertain position can give two constraints; wanted: no share below 0")
         count = near.distance.shape[1]
         half_spaces = HalfSpaces(np.zeros((len(near.members), count, 3)), np.full((len(near.members), count), -np.inf))
         which, normal, (bound, retreat) = np.empty(count, dtype=np.intp), np.empty((count, 3)), np.empty((2, count))

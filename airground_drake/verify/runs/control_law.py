@@ -97,6 +97,7 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
         np.array([getattr(pair, name) for pair in beside])[which] for name in ("law_m", "share", "speed_m_s")
     )
     normal = np.concatenate([near.away.normal, offset / np.where(apart > 0.0, apart, 1.0)[:, None]])
+    normal *= PLANE if planar else 1.0
     distance = np.append(near.away.distance, apart)
     bound = least_speeds(distance, safe, share, control, speed)
     retreat = retreats(distance, safe, speed, control.period_s)
@@ -106,12 +107,9 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     unsure = np.append(np.where(speed[: len(near.core)] > 0.0, trace.scenario.position_error_m, 0.0), unsure)
     if unsure.any():
         excess = distance - safe - np.where(speed > 0.0, speed * control.period_s, unsure)
-        k, normal, bound = _towards_unsure(
-            normal * (PLANE if planar else 1.0), bound, distance, excess, unsure, control.period_s, planar=planar
-        )
+        k, normal, bound = _towards_unsure(normal, bound, distance, excess, unsure, control.period_s, planar=planar)
         when, column, distance, retreat = when[k], column[k], distance[k], retreat[k]
     moves = np.array([trace.scenario.barriers[name].moves is not None for name in parts.names], dtype=np.bool_)
     rank = np.concatenate([np.where(moves[parts.owner], 2, 0), np.ones(len(trace.robots), dtype=np.intp)])
     order = np.lexsort([column, rank[column], when])
-    normal = normal * (PLANE if planar else 1.0)
     return Inequalities(when[order], column[order], normal[order], distance[order], bound[order], retreat[order])

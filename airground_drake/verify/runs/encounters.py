@@ -82,9 +82,7 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     place = trace.body(robot)
     origin = origin_of(trace, other)
     planar = is_planar(trace, robot)
-    # Errors of measured positions may use up all that the law keeps beyond d.
     keeps = pair.keeps_m(trace.scenario.control.period_s) - pair.cover_m
-    keeps = pair.safe_m if pair.error_m and not pair.speed_m_s else keeps
     off_m = off_m_of(trace, robot)
     step = steps_of(trace, robot)
     bounds = apart_by_blocks(cores, place - origin).min(axis=1)
@@ -221,8 +219,7 @@ def _steered_nearer(trace: Trace, pair: Pair, robot: str) -> bool:
     before, after = (
         over_time(cores, trace.position(robot)[at] - origin[rows[:-1]], planar=planar) for at in (rows[:-1], rows[1:])
     )
-    by_law = pair.keeps_m(trace.scenario.control.period_s)
-    keeps_m = pair.safe_m if pair.error_m and not pair.speed_m_s else by_law
+    keeps_m = pair.keeps_m(trace.scenario.control.period_s)
     return bool((after < np.minimum(before, keeps_m) - DISTANCE_TOLERANCE_M).any())
 
 

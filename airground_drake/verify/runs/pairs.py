@@ -79,7 +79,9 @@ class Pair(NamedTuple):
         return self.safe_m + self.more_m
 
     def keeps_m(self, period_s: float) -> float:
-        """`law_m` less errors, plus V h: with it at a sample, d is kept for a period whatever the barrier does."""
+        """The distance of steered points that robots do not undercut by their own motion in a period, m."""
+        if self.error_m and not self.speed_m_s:  # errors may use up the rest of what the law keeps
+            return self.safe_m + self.cover_m
         return self.law_m - self.error_m + self.speed_m_s * period_s
 
 
