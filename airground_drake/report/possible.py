@@ -23,7 +23,7 @@ from airground_drake.uav.channel import Message, Transit, lost
 from airground_drake.verify.claim import TIME_TOLERANCE_S as SAME_S
 
 CORNER_S = 1e-9  # a velocity so near to a corner of its preset, s, may be that of either side
-SAME_M_S = SAME_M = 1e-9
+SAME_M_S = SAME_M = 1e-9  # velocities and positions agree to this
 Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and as it is due
 
 
@@ -62,9 +62,9 @@ def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
             yield f"what {uav} sends or hears of {row['kind']} {number}", t_s, by_uav, f"before {until_s} s"
         if not (row["read_s"] >= row["received_s"] - SAME_S or math.isnan(row["read_s"])):
             yield f"reading of {row['kind']} {number}", t_s, row["read_s"], f"after {row['received_s']} s"
-        to, of, _, about = first.setdefault((row["kind"], number), (ugv, uav, t_s, row["about"]))
-        if (to, of, about) != (ugv, uav, row["about"]):
-            yield f"number of the proposal that {row['kind']} {number} is about", t_s, row["about"], about
+        original = first.setdefault((row["kind"], number), (ugv, uav, t_s, row["about"]))
+        if original != (ugv, uav, original[2], row["about"]):
+            yield f"number of the proposal that {row['kind']} {number} is about", t_s, row["about"], original[3]
     listed = (trace.proposals[name].tolist() for name in ("number", "robot", "sender", "issued_s", "number"))
     due = {("proposal", number): tuple(of_proposal) for number, *of_proposal in zip(*listed, strict=True)}
     charge = {ugv: uav for uav in scenario.aerial for ugv in scenario.in_charge(uav)}

@@ -104,3 +104,12 @@ def test_an_obstacle_that_promises_to_stand_is_no_reason_to_retreat() -> None:
         places = np.array([[0.56, 0.0, 0.0], [0.0, 0.0, 9.0], [0.0, 0.0, 0.0]])
         velocity = Avoidance(3.0, H, 4.0).command(np.zeros((1, 3)), places, team.around(slice(0, 1)))
         assert bool(velocity[0, 0] > 0.5) is moves
+
+
+def test_a_uav_near_what_may_move_stands_with_errors() -> None:
+    """In space the directions that surely lead away are no half-planes."""
+    places, wish = np.array([[9.0, 9.0, 0.0], [0.4, 0.0, 0.3], [0.0, 0.0, 0.0]]), np.array([[-0.3, 1.0, 0.0]])
+    for error_m, moves in ((0.0, True), (0.05, False)):
+        team = beside(SHAPES["person"], SPEED, 1, error_m=error_m)
+        law = Avoidance(3.0, H, 4.0, stands=error_m > 0.0)
+        assert law.command(wish, places, team.around(team.select("uav"))).any() == moves
