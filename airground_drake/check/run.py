@@ -16,6 +16,7 @@ from .scenario import (
     Pair,
     Preset,
     as_run,
+    has_own_views,
     levels_of,
     links_of,
     moving_of,
@@ -184,8 +185,10 @@ class Run:
         """Delay, s, and loss of positions between UGVs."""
         return links_of(self.scenario)
 
-    def seen_m(self, robot: str) -> Array:
-        """Positions of a robot that robots act on at the control samples, (S, 3), m."""
+    def seen_m(self, robot: str, by: str = "") -> Array:
+        """Positions of a robot that robots act on at the control samples, (S, 3), m; as another one measured them."""
+        if by not in ("", robot) and has_own_views(self.scenario):
+            return self.sampled(by, f"saw_{robot}_", "m")
         if self.scenario.get("sensing") or self.links["delay_s"]:
             return self.sampled(robot, "seen_", "m")
         return self.position_m[robot][self.sample_row]

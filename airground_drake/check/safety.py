@@ -16,7 +16,7 @@ from .files import Json
 from .plants import MOST_PARTS, STRAIGHT_M, Rows, least_radius_m, only_ahead, own_of, unicycle_of
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run, column_of
-from .scenario import Pair, expected_m_s, written
+from .scenario import Pair, expected_m_s, has_own_views, written
 from .shapes import Away
 
 FAR_M = 1e-6  # largest error of a distance in floating point, m; pairs that are farther apart need no exact arithmetic
@@ -229,7 +229,11 @@ def measured_shortfall_m(run: Run, law: Pair, rows: Rows, gain: Fraction, last: 
     # The steps are true ones. A pair that stands or is far violates nothing.
     samples = np.searchsorted(run.sample_row, rows[:-1])
     own_m, other_m = run.position_m[law.robot][rows], run.position_m[law.other][rows]
-    seen = run.seen_m(law.robot)[samples] - (run.seen_m(law.other)[samples] if law.other in run.robots else 0.0)
+    measuring = [law.robot, law.other] if law.other in run.robots and has_own_views(run.scenario) else [law.robot]
+    views = [
+        (run.seen_m(law.robot, by) - (run.seen_m(law.other, by) if law.other in run.robots else 0.0))[samples]
+        for by in measuring
+    ]
     apart, step = own_m[:-1] - other_m[:-1], np.diff(own_m, axis=0) - np.diff(other_m, axis=0)
     lasts = [Fraction(1)] * (len(apart) - 1) + [last]
     reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
@@ -243,7 +247,7 @@ def measured_shortfall_m(run: Run, law: Pair, rows: Rows, gain: Fraction, last: 
                 continue
             gone = [Fraction(axis) / lasts[k] for axis in step[k].tolist()]
             given = gone, Fraction(law.safe_m), Fraction(1), gain, len(part.corners) == 1
-            ways = part.away([Fraction(axis) for axis in seen[k].tolist()])
+            ways = [away for seen in views for away in part.away([Fraction(axis) for axis in seen[k].tolist()])]
             lacks = max(lacks, min(_missed_m(away, *given) for away in ways))
     return lacks
 
@@ -399,9 +403,10 @@ def _motion(run: Run) -> None:
         most = f"{spec['max_speed_m_s']} at most"
         holds("speed limit", slow, speed, most, about=robot, t_s=run.sample_s)
         if run.error_m:
-            off = np.linalg.norm(run.seen_m(robot) - place[run.sample_row], axis=1)
-            most = f"{run.error_m} m at most"
-            holds("error of the measured position", off <= run.error_m, off, most, about=robot, t_s=run.sample_s)
+            for by in run.robots if has_own_views(run.scenario) else (robot,):
+                off = np.linalg.norm(run.seen_m(robot, by) - place[run.sample_row], axis=1)
+                most, about = f"{run.error_m} m at most", robot if by == robot else f"{robot} by {by}"
+                holds("error of the measured position", off <= run.error_m, off, most, about=about, t_s=run.sample_s)
         elif run.links["delay_s"]:
             seen = run.seen_m(robot)
             close("announced position", seen, place[run.sample_row], within=SMALL, about=robot, t_s=run.sample_s)

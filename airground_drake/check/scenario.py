@@ -184,7 +184,15 @@ def pairs_of(scenario: Json) -> list[Pair]:
     seen = [pair._replace(halved=pair.share < 1.0 and (error_m > 0.0 or (lossy and pair.robot in scenario["ugvs"])))
             for pair in with_plants]  # fmt: skip
     seen = [pair._replace(asynchronous=old and {pair.robot, pair.other} <= {*scenario["ugvs"]}) for pair in seen]
-    return [_as_seen(pair, error_m) if error_m or pair.halved else pair for pair in seen]
+    gain = float(scenario["control"]["avoidance_gain_1_s"]) if has_own_views(scenario) else math.inf
+    return [_as_seen(pair, error_m, max(limit[pair.robot], limit.get(pair.other, 0.0)) / gain)
+            if error_m or pair.halved else pair for pair in seen]  # fmt: skip
+
+
+def has_own_views(scenario: Json) -> bool:
+    """Whether each robot measures the other robots, instead of all acting on published positions."""
+    sensing = scenario.get("sensing") or {}
+    return not sensing.get("shared", True) and float(sensing["position_error_m"]) > 0.0
 
 
 def is_asynchronous(scenario: Json) -> bool:
@@ -198,13 +206,16 @@ def links_of(scenario: Json) -> dict[str, float]:
     return {key: float(given.get(key, 0.0)) for key in ("delay_s", "loss")}
 
 
-def _as_seen(pair: Pair, error_m: float) -> Pair:
+def _as_seen(pair: Pair, error_m: float, fastest: float) -> Pair:
     """A pair under position errors: the distance e + sqrt(m^2 + e^2), plus drift over the pair's gain."""
-    # Of two robots one may stand: the pair then meets the law with half the gain, and a drift costs twice as much.
+    # Of two robots one may stand: the pair then meets the law with half the gain, and a drift costs twice as much. If
+    # each measures the other, their directions n and n' differ: |n - n'| <= 2 e / (sqrt(m^2 + e^2) - e).
+    # fastest: the faster robot's speed limit over the gain, m; 0 with the same positions for both
     robots = 2 if pair.halved else 1
     error_m, drift_m = robots * error_m, robots * pair.drift_m
-    undrifting = pair.safe_m + pair.more_m - pair.drift_m
-    law_m = error_m + math.hypot(undrifting, error_m) + drift_m
+    kept = math.hypot(pair.safe_m + pair.more_m - pair.drift_m, error_m)
+    drift_m += robots * fastest * 2.0 * error_m / (kept - error_m) if robots == 2 and fastest else 0.0
+    law_m = error_m + kept + drift_m
     return pair._replace(more_m=law_m - pair.safe_m, drift_m=drift_m, error_m=error_m)
 
 

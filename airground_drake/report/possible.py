@@ -6,6 +6,7 @@ so no run is simulated for this.
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from itertools import permutations
 from typing import Any
 
@@ -132,17 +133,21 @@ def _measured(trace: Trace, scenario: Scenario) -> Wrong:
     if errors is None or (scenario.faults and scenario.faults.late):
         return
     true = np.stack([trace.position(body.name)[trace.sample_rows] for body in world.moving], axis=1)
-    published, seen = (
+    views = trace.robots if scenario.own_views else ()
+    published, seen, *viewed = (
         np.array([measured(t, places) for t, places in zip(t_s, true, strict=True)])
-        for measured in (errors.published, errors.seen_by_uav)
+        for measured in (errors.published, errors.seen_by_uav, *(partial(errors.view_of, robot) for robot in views))
     )
     for i, ugv in enumerate(trace.ugvs if scenario.announces else ()):  # measured a period ago, and a step
         published[1:, i] = published[:-1, i] + scenario.control.period_s * trace.chosen(ugv)[:-1]
-    for stem, robots, due in (("seen", trace.robots, published), ("uav_saw", trace.ugvs, seen)):
-        for i, robot in enumerate(robots):
-            theirs = np.column_stack([trace.sampled(f"{robot}.{stem}_{axis}_m") for axis in "xyz"])
-            for k in np.flatnonzero(~(np.abs(theirs - due[:, i]).max(axis=1) <= SAME_M))[:1]:
-                yield f"position of {robot} as measured ({stem}), m,", t_s[k], theirs[k].tolist(), due[k, i].tolist()
+    columns = {f"{robot}.seen": published[:, i] for i, robot in enumerate(trace.robots)}
+    columns |= {f"{ugv}.uav_saw": seen[:, i] for i, ugv in enumerate(trace.ugvs)}
+    for robot, view in zip(views, viewed, strict=True):
+        columns |= {f"{robot}.saw_{other}": view[:, i] for i, other in enumerate(trace.robots) if other != robot}
+    for column, ours in columns.items():
+        theirs = np.column_stack([trace.sampled(f"{column}_{axis}_m") for axis in "xyz"])
+        for k in np.flatnonzero(~(np.abs(theirs - ours).max(axis=1) <= SAME_M))[:1]:
+            yield f"measured position {column}, m,", t_s[k], theirs[k].tolist(), ours[k].tolist()
 
 
 def _executed(trace: Trace, scenario: Scenario) -> Wrong:

@@ -12,6 +12,7 @@ from airground_drake.scenario.schema import Scenario
 # By term of a budget, the key that it comes from; a dip follows from several.
 KEYS = {
     "dip": "dip", "drift": "drift_m_s", "lag": "time_constant_s", "delay": "delay_s", "error": "position_error_m",
+    "views": "shared",
 }  # fmt: skip
 
 

@@ -344,6 +344,10 @@ class Sensing:
     """The kind of errors."""
     correlation_s: Positive = 1.0
     """Time between independent drawn errors, which are interpolated linearly."""
+    shared: bool = True
+    """Whether all robots act on the published positions. If not, each robot measures all other robots, so that two of
+    them see different directions: this costs more distance, and more the faster they are. Gatekeepers still act on
+    published positions."""
     uav_error_m: NotNegative = 0.0
     """Largest (drawn) error of the positions with which the UAV plans. Guaranteed distances do not depend on it."""
     seed: CountFromZero = 0
@@ -779,10 +783,16 @@ class Scenario:
         """Whether robots stand where their inequalities contradict one another."""
         return self.position_error_m > 0.0 or self.asynchronous
 
+    @property
+    def own_views(self) -> bool:
+        """Whether each robot acts on its own, inexact measurements of the other robots."""
+        return self.position_error_m > 0.0 and self.sensing is not None and not self.sensing.shared
+
     def seen(self, robot: str) -> dict[str, Any]:
-        """What the bounds of a robot's motion say about what is known: `error_m` and `may_stand`."""
+        """What the bounds of a robot's motion say about what is known: `error_m`, `may_stand` and `own_views`."""
         lossy = self.ugv_links is not None and self.ugv_links.loss > 0.0 and not self.asynchronous
-        return {"error_m": self.position_error_m, "may_stand": lossy and robot in self.ugvs}
+        may_stand = lossy and robot in self.ugvs
+        return {"error_m": self.position_error_m, "may_stand": may_stand, "own_views": self.own_views}
 
     @property
     def barriers(self) -> dict[str, Obstacle]:

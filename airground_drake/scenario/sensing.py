@@ -45,6 +45,14 @@ class Errors:
                 seen[i] += WITHIN * self._given.position_error_m * self._unit(i, t, places)
         return seen
 
+    def view_of(self, robot: str, t: float, places: Array) -> Array:
+        """Where a robot measures the bodies that move, (M, 3), m: itself as published, other robots with own errors."""
+        seen, by = places.copy(), self._world.index(robot)
+        for i in range(self._robots.start, self._robots.stop) if self._given.position_error_m else ():
+            error = self._unit(i, t, places, None if i == by else by)
+            seen[i] += WITHIN * self._given.position_error_m * error
+        return seen
+
     def seen_by_uav(self, t: float, places: Array) -> Array:
         """Where the UAV sees the bodies that move, to plan with, (M, 3), m."""
         seen, ugvs = places.copy(), self._world.select("ugv")
@@ -52,12 +60,14 @@ class Errors:
             seen[i] += WITHIN * self._given.uav_error_m * self._drawn(i, t, "uav")
         return seen
 
-    def _unit(self, i: int, t: float, places: Array) -> Array:
-        """The error of robot i over its bound, (3,)."""
+    def _unit(self, i: int, t: float, places: Array, by: int | None = None) -> Array:
+        """The error over its bound, (3,), of robot i as it publishes it, or as another robot measures it."""
         how, who = self._given.errors, self._world.moving[i].name
+        if by is not None:
+            who = f"{who} by {self._world.moving[by].name}"
         if how == "drawn":
-            return self._drawn(i, t, "")
-        away = places[i] - self._nearest(i, places)
+            return self._drawn(i, t, "" if by is None else f"by {self._world.moving[by].name}")
+        away = places[i] - (self._nearest(i, places) if by is None else places[by])
         away[self._axes[i] :] = 0.0
         length = float(np.linalg.norm(away))
         away = away / length if length else np.array([1.0, 0.0, 0.0])

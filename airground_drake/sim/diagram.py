@@ -172,9 +172,10 @@ def build_model(
     uavs = {uav: _uav_controller(scenario, world, uav) for uav in scenario.aerial}
     # input ports of the parts for which `bodies` are positions as published, and as UAVs see them
     measured, seen = ({} if port == "bodies" else {"bodies": port} for port in (between.published, between.seen))
+    views = {uav: {"bodies": between.views[uav]} if between.views else measured for uav in uavs}
     parts = {
         "decision_making": decision,
-        "task_planning": _task_planning(presets, planners, ugvs, uavs, measured, seen),
+        "task_planning": _task_planning(presets, planners, ugvs, uavs, measured, seen, views),
         "optimisation": _assembled("optimisation", {"gatekeeper": answering}, answers, renamed={answering: measured}),
         "vehicles": vehicles,
     }
@@ -185,14 +186,14 @@ def build_model(
         links = Downlink(down, sent, start, period, retry, [*scenario.lost_s.values()]), Uplink(up, period)
         parts |= {"downlink": links[0], "uplink": links[1]}
     if errors := errors_of(scenario, world):
-        parts["sensing"] = PositionSensing(errors, world)
+        parts["sensing"] = PositionSensing(errors, world, between.views)
     parts |= between.parts
     if monitor is not None:
         parts["monitor"] = monitor
     named = {port.get_name(): port for part in parts.values() for port in outputs_of(part)}
     if isinstance(ugvs, OwnUgvController):
         ugvs.require_inputs(named)
-    recorded = (*RECORDED, *(name for name in OF_SOME if name in named))
+    recorded = (*RECORDED, *(name for name in (*OF_SOME, *between.views.values()) if name in named))
     exported = [*recorded, *(["violation"] if monitor is not None else [])]
     diagram = _assembled(f"{scenario.name}_method_{chosen.id}", parts, named, exported, renamed=between.renamed)
     return Model(
@@ -255,6 +256,7 @@ def _task_planning(
     uavs: Mapping[str, UavController],
     measured: Mapping[str, str],
     seen: Mapping[str, str],
+    views: Mapping[str, Mapping[str, str]],
 ) -> Diagram:
     """The task planning layer: preset trajectories, planners, controllers."""
     times, places = components.stack_presets(list(presets))
@@ -288,7 +290,7 @@ def _task_planning(
         "gains": ugvs.GetOutputPort("gains"),
         "uav_command": flies.get_output_port(0),
     }
-    renamed: dict[System, Mapping[str, str]] = dict.fromkeys([ugvs, *uavs.values()], measured)
+    renamed: dict[System, Mapping[str, str]] = {ugvs: measured, **{uavs[uav]: view for uav, view in views.items()}}
     renamed |= dict.fromkeys(planners.values(), seen)
     return _assembled("task_planning", systems, named, None, wires, renamed=renamed)
 

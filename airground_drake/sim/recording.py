@@ -151,6 +151,11 @@ def samples(
         columns |= {f"{robot}.v{axis}_m_s": chosen[3 * i + a] for a, axis in enumerate("xyz")}
         if (published := logged.get("announced", logged.get("published"))) is not None:
             columns |= {f"{robot}.seen_{axis}_m": published[3 * i + a, at] for a, axis in enumerate("xyz")}
+        if (view := logged.get(f"view_of_{robot}")) is not None:
+            columns |= {
+                f"{robot}.saw_{other}_{axis}_m": view[3 * k + a, at]
+                for k, other in enumerate(robots) if k != i for a, axis in enumerate("xyz")
+            }  # fmt: skip
     for i, ugv in enumerate(ugvs):
         columns |= {f"{ugv}.ref_{axis}_m": reference[3 * i + a] for a, axis in enumerate("xyz")}
         columns |= {f"{ugv}.ref_v{axis}_m_s": reference[3 * (len(ugvs) + i) + a] for a, axis in enumerate("xyz")}

@@ -31,6 +31,7 @@ chose, which is held until the next sample.
     <ugv>.executing                           number of the proposal executed from this sample on, -1 without one
     <robot>.seen_x_m .seen_y_m .seen_z_m      only with `sensing` or `channel.ugvs.delay_s`: its published position,
                                               which robots act on
+    <robot>.saw_<other>_x_m ... _z_m          only with `sensing.shared: false`: where it measured another robot
     <ugv>.heard_<other>_s                     only with `channel.ugvs.loss` or `control.law: asynchronous`: the sample
                                               at which another UGV published the last position that this one has of it
     <ugv>.uav_saw_x_m .uav_saw_y_m .uav_saw_z_m  only with `sensing`: where the UAV saw it, to plan with
@@ -299,6 +300,8 @@ class Trace:
             TraceError: if a row of `seen` is not at the time of a control sample.
         """
         if self.scenario.publishes and of in self.robots:
+            if by != of and by in self.robots and self.scenario.own_views:
+                return self._vectors(self.sampled, by, f"saw_{of}_", "m")
             return self._vectors(self.sampled, of, "seen_", "m")
         places = self.position(of)[self.sample_rows]
         mine = self.seen[(self.seen["by"] == by) & (self.seen["of"] == of)]

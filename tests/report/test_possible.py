@@ -86,8 +86,8 @@ FORGERIES: dict[str, tuple[str, Any]] = {
     "a repeat about another one": ("number of the proposal that ", column(
         "messages", "about", lambda f: 9, first(attempt=1))),
     "all positions heard": ("last position of ", column("samples", "ugv1.heard_ugv2_s", lambda f: f["t_s"])),
-    "a smaller error": ("position of ugv1 as measured (seen)", column("samples", "ugv1.seen_x_m", lambda f: 0.0)),
-    "the UAV saw better": ("position of ugv2 as measured (uav_saw)", column(
+    "a smaller error": ("measured position ugv1.seen", column("samples", "ugv1.seen_x_m", lambda f: 0.0)),
+    "the UAV saw better": ("measured position ugv2.uav_saw", column(
         "samples", "ugv2.uav_saw_y_m", lambda f: f["ugv2.seen_y_m"])),
     "another reference": ("velocity of the preset of ", column("samples", "ugv2.ref_vx_m_s", lambda f: 0.1)),
     "nothing executed": ("number of the proposal", lambda trace: replace(trace, samples=trace.samples.assign(

@@ -313,8 +313,11 @@ TOGETHER = [
             ["ugvs.ugv2.start_m=[-6, 1.1, 0]"],
             ["sensing.position_error_m=-0.1"],
             ["sensing.errors=loud"],
+            ["sensing.shared=false", "channel.ugvs={loss: 0.2}"],
+            ["sensing.shared=false", "ugvs.ugv2.start_m=[-6, 1.2, 0]"],
         )
     ),
+    ("two_uavs", [*ERRORS, "sensing.shared=false", "safe_distance.uav_m=0"]),
 ]
 """A shipped scenario, and several `--set` that do not go together."""
 

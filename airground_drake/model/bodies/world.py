@@ -34,6 +34,7 @@ class Body:
         disappears_s: time from which on it is not there any more, s.
         error_m: of a robot, bound of the error of its measured position, m.
         may_stand: whether a robot may stand because it does not know where another one is.
+        own_views: whether a robot acts on its own measurements of other robots.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Body:
     disappears_s: float = np.inf
     error_m: float = 0.0
     may_stand: bool = False
+    own_views: bool = False
 
     def __post_init__(self) -> None:
         """Check the kind and the speed limit."""
@@ -66,7 +68,9 @@ class Body:
         """How far a robot's body may be from its steered point."""
         if not (self.plant and self.kind in ROBOTS):
             return AT_REST
-        return self.plant.bounds(self.max_speed_m_s)._replace(error_m=self.error_m, may_stand=self.may_stand)
+        return self.plant.bounds(self.max_speed_m_s)._replace(
+            error_m=self.error_m, may_stand=self.may_stand, own_views=self.own_views
+        )
 
 
 class Neighbours(NamedTuple):

@@ -21,6 +21,9 @@ If the law acts on measured positions with errors of at most e_i and e_j, then w
 if e (1 - A' h) <= A' h (d_law - e - drifts / A'), where the last factor is the distance of the points at the samples.
 Beside a static set A' = A. One of two robots may have to stand, because measured inequalities contradict one another or
 because it misses the other's position: then the pair meets the law with A' = A / 2 (theorem Budget.one_stands).
+
+Two robots that do not share measured positions, but measure each other, see the pair in two directions. With m the
+square root above and V the larger speed limit, this costs 2 V e / ((m - e) A') (theorem Budget.own_views).
 """
 
 import math
@@ -47,6 +50,7 @@ class Bounds(NamedTuple):
     # Error bound of the steered point's measured position; both robots of a pair use the same measured positions.
     error_m: float = 0.0
     may_stand: bool = False  # whether the robot may stand because it misses another one's position
+    own_views: bool = False  # whether the robot acts on its own measurements of other robots
 
     @property
     def exact(self) -> bool:
@@ -94,7 +98,20 @@ def law_distance(
     if not error:
         return kept + sum(cost.metres for cost in added)
     kept = kept + sum(cost.metres for cost in added if cost.term != "drift")
-    return error + np.hypot(kept, error) + sum(cost.metres for cost in added if cost.term == "drift")
+    drifts = sum(cost.metres for cost in added if cost.term == "drift")
+    return error + np.hypot(kept, error) + drifts + of_views(distance, one, other, gain=gain)
+
+
+def of_views(distance: Array | float, one: Bounds, other: Bounds = AT_REST, *, gain: float) -> Array | float:
+    """Cost of the different directions that two robots see if each measures the other, m; `distance` of bodies in m."""
+    error = one.error_m + other.error_m
+    if not (error and one.own_views and other.own_views):
+        return 0.0
+    sharing = (bounds._replace(drift_m_s=0.0, own_views=False) for bounds in (one, other))
+    least = np.asarray(law_distance(distance, *sharing, gain=gain)) - 2.0 * error  # that either measures
+    speed = max(one.speed_m_s, other.speed_m_s)
+    cost = 2.0 * speed * error / np.where(least > 0.0, least, np.inf) / (gain * part_of_gain(one, other))
+    return cost if cost.ndim else float(cost)
 
 
 def part_of_gain(one: Bounds, other: Bounds = AT_REST) -> float:
@@ -106,13 +123,14 @@ def part_of_gain(one: Bounds, other: Bounds = AT_REST) -> float:
 def least_gain(distance: float, one: Bounds, other: Bounds = AT_REST) -> float:
     """The least A h for which the theorem covers the pair's position errors; `distance` of bodies in m."""
     error = one.error_m + other.error_m
-    undrifting = one._replace(drift_m_s=0.0), other._replace(drift_m_s=0.0)
+    undrifting = (bounds._replace(drift_m_s=0.0, own_views=False) for bounds in (one, other))
     kept = float(law_distance(distance, *undrifting, gain=1.0)) - error
     return error / (error + kept) / part_of_gain(one, other) if error else 0.0
 
 
 def kept_distance(points: float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False) -> float:
     """Lower bound of the bodies' distance if steered points keep `points`, m: the inverse of `law_distance`."""
+    # Without `of_views`, which depends on the promised distance.
     # -inf where nothing is promised: within tau V of a set, say, the body may be anywhere beside it.
     added = list(_added(one, other, gain=gain, passive=passive))
     if error := one.error_m + other.error_m:
@@ -151,7 +169,8 @@ def costs(distance: float, one: Bounds, other: Bounds = AT_REST, *, gain: float,
         found.insert(0, Cost("cover", 0, math.hypot(distance, one.cover_m) - distance))
     if error := one.error_m + other.error_m:
         kept = distance + sum(cost.metres for cost in found if cost.term != "drift")
-        found.append(Cost("error", -1, error + math.hypot(kept, error) - kept))
+        views = float(of_views(distance, one, other, gain=gain))
+        found += [Cost("error", -1, error + math.hypot(kept, error) - kept), Cost("views", -1, views)]
     return [cost for cost in found if cost.metres > 0.0]
 
 

@@ -1,4 +1,4 @@
-"""Positions sent between UGVs over links with delay and loss: announcements, receipts, and the controllers' reactions.
+"""What UGVs know of each other's positions: announcements, receipts, own measurements, and controllers that use them.
 
 Under the shared law a robot publishes at a control sample its position at the next one, so messages have a period to
 arrive. If a UGV misses this sample's message of another UGV, it stands still, unless the other one is certainly far;
@@ -8,6 +8,7 @@ position.
 
 import random
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -111,14 +112,8 @@ class Hearing(LeafSystem):
             discrete.set_value(2, np.append(under_way, published))
 
 
-class HearingUgvController(UgvController):
-    """A `UgvController` with the further input ports `heard_s` and `last_places`, see `Hearing`."""
-
-    def __init__(self, world: World, law: UgvLaw) -> None:
-        super().__init__(world, law)
-        n = len(world.names("ugv"))
-        self._heard = self.DeclareVectorInputPort("heard_s", n * n)
-        self._last_places = self.DeclareVectorInputPort("last_places", 3 * n * n)
+class SeparateUgvController(UgvController):
+    """A `UgvController` whose UGVs know different positions."""
 
     def _alone(
         self, i: int, known: Array, near: Neighbours, t: float, reference: Array, rate: Array,
@@ -132,6 +127,30 @@ class HearingUgvController(UgvController):
         asked = [None if motion is None else asked_at(motion, t)]
         velocity: Array = law.velocity(known, near, reference[row], rate[row], asked, steered)[0]
         return velocity
+
+
+class ViewsUgvController(SeparateUgvController):
+    """UGVs that measure each other: with the input ports `view_of_<ugv>` (3M) m for each UGV, see `PositionSensing`."""
+
+    def __init__(self, world: World, law: UgvLaw, views: Sequence[str]) -> None:
+        super().__init__(world, law)
+        self._views = [self.DeclareVectorInputPort(view, 3 * len(world.moving)) for view in views]
+
+    def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
+        near, velocity = self._world.at(self._near, t), np.empty((len(self._views), 3))
+        for i, view in enumerate(self._views):
+            velocity[i] = self._alone(i, view.Eval(context).reshape(-1, 3), near, t, *about)
+        return velocity
+
+
+class HearingUgvController(SeparateUgvController):
+    """A `UgvController` with the further input ports `heard_s` and `last_places`, see `Hearing`."""
+
+    def __init__(self, world: World, law: UgvLaw) -> None:
+        super().__init__(world, law)
+        n = len(world.names("ugv"))
+        self._heard = self.DeclareVectorInputPort("heard_s", n * n)
+        self._last_places = self.DeclareVectorInputPort("last_places", 3 * n * n)
 
 
 class AsynchronousUgvController(HearingUgvController):
@@ -205,6 +224,7 @@ class Between(NamedTuple):
     renamed: Mapping[System, Mapping[str, str]]  # what feeds their port `bodies`
     published: str  # name of the output port with the positions that robots act on
     seen: str  # and of that with those with which UAVs plan
+    views: Mapping[str, str] = MappingProxyType({})  # and of those where robots that measure the others see them
 
 
 def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
@@ -220,6 +240,10 @@ def positions_between(scenario: Scenario, world: World, law: UgvLaw) -> Between:
         late, seed = (scenario.faults or Faults()).late, scenario.channel.seed if scenario.channel else 1
         parts["announcements"] = Announcements(world, period, late, seed)
         renamed[parts["announcements"]], published = {"bodies": published}, "announced"
+    if scenario.own_views:
+        views = {robot: f"view_of_{robot}" for robot in world.robots}
+        controller = ViewsUgvController(world, law, [views[ugv] for ugv in world.names("ugv")])
+        return Between(controller, parts, renamed, published, seen, views)
     if not (scenario.channel and link and link.loss):
         return Between(UgvController(world, law), parts, renamed, published, seen)
     parts["hearing"] = Hearing(world, scenario.channel.seed, link.loss, period)

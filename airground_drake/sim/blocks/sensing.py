@@ -1,6 +1,6 @@
 """The measured positions of robots as a LeafSystem."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -18,16 +18,21 @@ class PositionSensing(LeafSystem):
 
     Ports (M bodies that move, world frame):
         in  `bodies` (3M) m.
-        out `published` (3M) m and `seen_by_uav` (3M) m; of bodies that are no robots the true places.
+        out `published` (3M) m and `seen_by_uav` (3M) m; with `sensing.shared: false` also `view_of_<robot>` (3M) m,
+            where the robot measures all of them; of bodies that are no robots the true places.
     State: none. An error depends on the time and on true places alone.
     """
 
-    def __init__(self, errors: Errors, world: World) -> None:
+    def __init__(self, errors: Errors, world: World, views: Mapping[str, str]) -> None:
+        """`views` names the output port for each robot that measures the others."""
         super().__init__()
         self._bodies = declare_bodies(self, world)
         needs, size = {self._bodies.ticket(), self.time_ticket()}, 3 * len(world.moving)
-        for measured in (errors.published, errors.seen_by_uav):
-            declare_output(self, measured.__name__, size, partial(type(self)._measured, measured=measured), needs)
+        ports: dict[str, Callable[[float, Array], Array]]
+        ports = {"published": errors.published, "seen_by_uav": errors.seen_by_uav}
+        ports |= {port: partial(errors.view_of, robot) for robot, port in views.items()}
+        for name, measured in ports.items():
+            declare_output(self, name, size, partial(type(self)._measured, measured=measured), needs)
 
     def _measured(self, context: Context, measured: Callable[[float, Array], Array]) -> Array:
         return measured(context.get_time(), np.asarray(self._bodies.Eval(context)).reshape(-1, 3)).ravel()

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from airground_drake.base.exact import decimal
-from airground_drake.model.plants.budget import AT_REST, kept_distance, least_gain
+from airground_drake.model.plants.budget import AT_REST, kept_distance, least_gain, of_views
 from airground_drake.model.plants.plant import Plant
 from airground_drake.scenario.budget import alike, budget, takes_room
 from airground_drake.scenario.plants import made
@@ -20,6 +20,7 @@ BASIC = ("Budget.at_samples", "Budget.budget_always")
 # Those about a robot beside an obstacle that may move; a plant adds its own.
 OF_STANDING = ("Budget.one_stands", "Budget.smaller_gain", "Mixed.entry_keeps")
 OF_ERRORS = ("Budget.measured_start", *OF_STANDING)
+OF_VIEWS = ("Budget.own_views",)
 OF_OLD = ("Async.towards_old", "Async.old_positions")
 BESIDE_MOVING = ("Passive.own_doing", "Passive.kept")
 
@@ -60,8 +61,7 @@ class SafeBudget(TheoremClaim):
         "The scenario's plants describe the robots exactly: no slip, no error of heading, time constant or delay. "
         "Drift and cover of the user's own plants stay within the declared values (SAFE-HYP measures both in the run).",
         "Commands stay within the speed limits (SAFE-HYP checks the run).",
-        "Errors of measured positions stay within their bound, and all robots act on the same positions (SAFE-HYP "
-        "checks both in the run).",
+        "Errors of measured positions stay within their bound (SAFE-HYP checks the run).",
         "UGVs that act on old positions of each other are discs that follow commands exactly (others are refused), and"
         " start d apart; the positions were exact when sent, and both have the period h (SAFE-HYP checks each step).",
         "A delay comes before a lag. Between a robot with either and a unicycle, both costs are added.",
@@ -70,7 +70,7 @@ class SafeBudget(TheoremClaim):
         "That the steered points keep the law's distance (SAFE-INV does), or that commands were not shortened: a "
         "shortened command recovers a distance with a smaller gain."
     )
-    theorems: tuple[str, ...] = (*BASIC, *OF_ERRORS, *OF_OLD, *BESIDE_MOVING, "Plants", "Turning", "Mixed")
+    theorems: tuple[str, ...] = (*BASIC, *OF_ERRORS, *OF_VIEWS, *OF_OLD, *BESIDE_MOVING, "Plants", "Turning", "Mixed")
     margin_of = "distance in the law less what the plants take"
 
     def applies(self, scenario: Scenario) -> bool:
@@ -89,6 +89,7 @@ class SafeBudget(TheoremClaim):
             },
             **({"position_error_m": scenario.position_error_m} if scenario.position_error_m else {}),
             **({"may_stand": stands} if (stands := [n for n in robots if scenario.seen(n)["may_stand"]]) else {}),
+            **({"own_views": True} if scenario.own_views else {}),
             **({"old_positions": self._old(scenario)} if scenario.asynchronous else {}),
             "pairs": [
                 {
@@ -117,6 +118,7 @@ class SafeBudget(TheoremClaim):
         if moving:
             named += [*BESIDE_MOVING, *(name for plant in plants for name in plant.passive_theorems)]
         named += OF_ERRORS if "position_error_m" in inputs else OF_STANDING if "may_stand" in inputs else ()
+        named += OF_VIEWS if "own_views" in inputs else ()
         named = [*(named if inputs["pairs"] else ()), *(OF_OLD if "old_positions" in inputs else ())]
         claim = SafeBudget()
         claim.theorems = (*dict.fromkeys(named),)
@@ -144,15 +146,16 @@ class SafeBudget(TheoremClaim):
     def _pairs(self, inputs: dict[str, Any]) -> Iterator[Hypothesis]:
         error_m = inputs.get("position_error_m", 0.0)
         share = float(decimal(inputs["avoidance_gain_1_s"]) * decimal(inputs["period_s"]))
-        stands = inputs.get("may_stand", ())
+        stands, own_views = inputs.get("may_stand", ()), "own_views" in inputs
         bounds = {
-            name: plant.bounds(speed)._replace(error_m=error_m, may_stand=name in stands)
+            name: plant.bounds(speed)._replace(error_m=error_m, may_stand=name in stands, own_views=own_views)
             for name, (plant, speed) in _plants(inputs).items()
         }
         for pair in inputs["pairs"]:
             both = (bounds[pair["first"]], bounds.get(pair["second"], AT_REST))
             passive = pair["kind"] == "moving"
-            kept = kept_distance(pair["law_m"], *both, gain=inputs["avoidance_gain_1_s"], passive=passive)
+            points = pair["law_m"] - float(of_views(pair["safe_m"], *both, gain=inputs["avoidance_gain_1_s"]))
+            kept = kept_distance(points, *both, gain=inputs["avoidance_gain_1_s"], passive=passive)
             says = (
                 f"{pair['first']}, {pair['second']}: {pair['law_m']:.6g} m in the law keep {kept:.6g} m, at least "
                 f"the {pair['safe_m']:.6g} m promised"

@@ -113,8 +113,8 @@ class SafeHyp(TraceClaim):
         "law held and the obstacle was no faster than declared, so d was kept in every period that began at d + V "
         "h or more. The controllers had the scenario's parameters; a controller of the user's own is judged by "
         "its steps alone. If robots act on measured positions, the inequalities are about measured positions "
-        "(beside an obstacle that may move, about true or measured ones), the errors were within their bound, and "
-        "d is about true bodies. If messages between UGVs may be lost, a UGV stood unless it knew that the "
+        "(beside an obstacle that may move, about true or measured ones; of two robots that measure each other, about "
+        "those of one of them), the errors were within their bound, and d is about true bodies. If messages between UGVs may be lost, a UGV stood unless it knew that the "
         "senders of missing messages were far. If UGVs act on old positions (`control.law: asynchronous`), each "
         "step avoided all points that the other could reach before it decided again, up to e, and the two kept d "
         "minus the sum of all e."
@@ -155,7 +155,7 @@ class SafeHyp(TraceClaim):
         "time on, and the safe start is that D >= d at that sample. At that sample, the bodies of robots that lag, "
         "receive commands late or never drive backwards must also be clear, and so must their paths during the delay "
         "under commands already given. Otherwise nothing is promised for the pair.",
-        "All robots act on the same measured positions, those that are recorded.",
+        "Robots act on the measured positions that are recorded.",
         "With `control.law: asynchronous` UGVs are discs that follow commands exactly, and the positions that they "
         "receive were exact when sent.",
         "Beside an obstacle that may move no safe start is required, because the robot is passive near it.",
@@ -305,7 +305,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
         seen = partial(_seen, trace, pair, there) if pair.error_m or part_of_gain(*both) < 1.0 else None
         missed = [
-            shortfalls(first, place, pair.law_m, *asked, core, planar=planar, seen=seen(place) if seen else None)
+            shortfalls(first, place, pair.law_m, *asked, core, planar=planar, seen=seen(place) if seen else ())
             for place, core in beside
         ]
         begun = [shortage(first[0], place.reshape(-1, 3)[0], pair.law_m, core, planar=planar) for place, core in beside]
@@ -321,7 +321,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
             elif pair.error_m and not _bears_errors(pair, gain, lost):
                 gap, why = -inf, "the steered points came too near for errors of measured positions"
             elif lost > 0:  # it reduces the distance of the points, which gives the distance of the bodies
-                points = nextafter(pair.law_m - rounded_up(lost), -inf)
+                points = nextafter(pair.law_m - rounded_up(lost) - pair.views_m, -inf)
                 kept = kept_distance(points, *both, gain=trace.scenario.control.avoidance_gain_1_s) - pair.radii_m
                 gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
         yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
@@ -346,12 +346,14 @@ def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
     return Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
 
 
-def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> tuple[Array, Array]:
-    """Measured positions of a pair at the samples, (K, 3), m, each."""
+def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> list[tuple[Array, Array]]:
+    """Measured positions of a pair at the samples, (K, 3), m, each; if each measures the other, those of both."""
     samples = slice(there.start, there.stop - 1)
-    own = trace.as_seen(pair.first, pair.first)[samples]
-    other = trace.as_seen(pair.first, pair.second)[samples] if pair.second in trace.robots else None
-    return own, np.broadcast_to(place, own.shape) if other is None else other
+    if pair.second not in trace.robots:
+        own = trace.as_seen(pair.first, pair.first)[samples]
+        return [(own, np.broadcast_to(place, own.shape))]
+    measuring = [pair.first, pair.second] if pair.views_m else [pair.first]
+    return [(trace.as_seen(by, pair.first)[samples], trace.as_seen(by, pair.second)[samples]) for by in measuring]
 
 
 def _bears_errors(pair: Pair, gain: Fraction, lost: Fraction) -> bool:
@@ -475,8 +477,10 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
         spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
         if trace.scenario.position_error_m or (trace.scenario.sensing and not trace.scenario.announces):
-            left = error_margins(trace, robot)
-            yield _Hypothesis(MEASURED, "m", trace.sampled("t_s"), left, 0.0, about)
+            for of in trace.robots if bounds_of(trace)[robot].own_views else (robot,):
+                of_other = {} if of == robot else {"other": of}
+                left = error_margins(trace, robot, of)
+                yield _Hypothesis(MEASURED, "m", trace.sampled("t_s"), left, 0.0, about | of_other)
         elif trace.scenario.announces:
             off = np.linalg.norm(trace.as_seen(robot, robot) - place[samples], axis=1)
             yield _Hypothesis(ANNOUNCED, "m", trace.sampled("t_s"), 0.0 - off, DISTANCE_TOLERANCE_M, about)
@@ -503,10 +507,10 @@ def _unheard(trace: Trace) -> Iterator[_Hypothesis]:
         yield _Hypothesis(UNHEARD, "m", t, margin, DISTANCE_TOLERANCE_M, {"first": first, "second": second})
 
 
-def error_margins(trace: Trace, robot: str) -> Array:
-    """Margins of a robot's position errors to their bound, (S,), m, with exact signs."""
+def error_margins(trace: Trace, by: str, of: str) -> Array:
+    """Margins of the errors of a robot's position, as a robot measures it, to their bound, (S,), m; exact signs."""
     most = decimal(trace.scenario.position_error_m)
-    seen, true = trace.as_seen(robot, robot).tolist(), trace.position(robot)[trace.sample_rows].tolist()
+    seen, true = trace.as_seen(by, of).tolist(), trace.position(of)[trace.sample_rows].tolist()
     margins = list[float]()
     for measured, place in zip(seen, true, strict=True):
         squared = sum((Fraction(a) - Fraction(b)) ** 2 for a, b in zip(measured, place, strict=True))

@@ -305,3 +305,50 @@ Proof.
   intros Hh M; apply Rle_trans with (2 := M); unfold bound; destruct (Rle_dec D d) as [| out]; [lra |].
   assert (I : 0 < / h) by (apply Rinv_0_lt_compat; lra); unfold Rdiv; nra.
 Qed.
+
+(** Two directions differ by no more than twice the difference of the places that they lead to, over both distances. *)
+Lemma directions D D' n n' : 0 <= D -> 0 <= D' -> norm n = 1 -> norm n' = 1 ->
+  norm (sub n n') * (D + D') <= 2 * norm (sub (scale D n) (scale D' n')).
+Proof.
+  intros H H' U U'; pose proof (norm_nonneg (sub n n')); pose proof (norm_nonneg (sub (scale D n) (scale D' n'))).
+  pose proof (norm_square n) as N; pose proof (norm_square n') as N'; rewrite U in N; rewrite U' in N'.
+  pose proof (dot_le n n') as C; rewrite U, U' in C; set (c := dot n n') in *.
+  apply Rsqr_incr_0_var; [| lra]; unfold Rsqr.
+  replace (norm (sub n n') * (D + D') * (norm (sub n n') * (D + D')))
+    with (norm (sub n n') * norm (sub n n') * ((D + D') * (D + D'))) by ring.
+  replace (2 * norm (sub (scale D n) (scale D' n')) * (2 * norm (sub (scale D n) (scale D' n'))))
+    with (4 * (norm (sub (scale D n) (scale D' n')) * norm (sub (scale D n) (scale D' n')))) by ring.
+  rewrite !norm_square.
+  replace (dot (sub n n') (sub n n')) with (dot n n + dot n' n' - 2 * c) by (unfold c; destruct n, n'; vectors; ring).
+  replace (dot (sub (scale D n) (scale D' n')) (sub (scale D n) (scale D' n')))
+    with (D * D * dot n n + D' * D' * dot n' n' - 2 * D * D' * c) by (unfold c; destruct n, n'; vectors; ring).
+  rewrite <- N, <- N'; pose proof (Rle_0_sqr (D - D')) as S; unfold Rsqr in S.
+  assert (T : 0 <= (1 + c) * ((D - D') * (D - D'))) by (apply Rmult_le_pos; lra); lra.
+Qed.
+
+(** THEOREM: If two robots measure each other, both do their share of the law along the direction that one of them sees,
+    but for a slack of 2 V e / (D + D').
+    - The robot whose slack this is sees a distance D' that is not larger, and is no faster than V.
+    - Their measurements of the pair differ by e at most. *)
+Lemma own_views h A d q D D' n n' u V e : 0 < h -> 0 <= A -> 0 <= q -> 0 < D -> 0 <= D' <= D -> norm n = 1 ->
+  norm n' = 1 -> norm u <= V -> norm (sub (scale D n) (scale D' n')) <= e -> q * bound h A d D' <= - dot n' u ->
+  q * bound h A d D - 2 * V * e / (D + D') <= - dot n u.
+Proof.
+  intros Hh HA Hq HD HD' U U' HV E M; pose proof (directions D D' n n' (Rlt_le _ _ HD) (proj1 HD') U U') as X.
+  assert (B : bound h A d D <= bound h A d D').
+  { assert (I : 0 < / h) by (apply Rinv_0_lt_compat; lra); unfold bound, Rdiv.
+    destruct (Rle_dec D d) as [a | a]; destruct (Rle_dec D' d) as [b | b]; try lra.
+    - apply Rmult_le_compat_l; lra.
+    - apply Rle_trans with 0; [nra | apply Rmult_le_pos; lra].
+    - apply Rmult_le_compat_r; lra. }
+  assert (q * bound h A d D <= q * bound h A d D') by (apply Rmult_le_compat_l; lra).
+  pose proof (dot_le (sub n n') u) as C; pose proof (norm_nonneg u); pose proof (norm_nonneg (sub n n')).
+  replace (dot (sub n n') u) with (dot n u - dot n' u) in C by (destruct n, n', u; vectors; ring).
+  assert (Y : norm (sub n n') * norm u <= 2 * V * e / (D + D')).
+  { apply Rmult_le_reg_r with (D + D'); [lra |]; replace (2 * V * e / (D + D') * (D + D')) with (2 * V * e) by (field; lra).
+    apply Rle_trans with (V * (norm (sub n n') * (D + D'))); [| apply Rle_trans with (V * (2 * e)); [| lra]].
+    - replace (norm (sub n n') * norm u * (D + D')) with (norm u * (norm (sub n n') * (D + D'))) by ring.
+      apply Rmult_le_compat_r; [apply Rmult_le_pos |]; lra.
+    - apply Rmult_le_compat_l; lra. }
+  lra.
+Qed.

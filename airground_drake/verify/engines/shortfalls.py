@@ -45,7 +45,7 @@ def demanded(lacking: Any, inside: Any, outside: Any) -> Any:
 
 def shortfalls(
     first: Array, second: Array, d: float, share: Fraction, gain: Fraction, last: Fraction,
-    core: Cores = POINT, *, planar: bool = False, held: bool = False, seen: tuple[Array, Array] | None = None,
+    core: Cores = POINT, *, planar: bool = False, held: bool = False, seen: Sequence[tuple[Array, Array]] = (),
 ) -> Array:  # fmt: skip
     """A pair's violation at each sample, e_1 + e_2, rounded up: (K,), m per control period."""
     # With a body that may move with V, the first one alone keeps the passive law: share 1, gain 0, d + V h in place of
@@ -54,14 +54,16 @@ def shortfalls(
     # first, second: (K + 1, 3), m
     # gain: a.
     # planar: whether the first body stays in its plane: then no way leads out of a core through its top.
-    # seen: measured places of both, (K, 3), m, if robots act on these.
+    # seen: measured places of both, (K, 3), m, if robots act on these; if each measures the other, those of both: then
+    # the pair has to meet the law by one of them.
     other = np.broadcast_to(second, first.shape)
     missed = np.zeros(len(first) - 1)
     pair = _Pair(core, planar, Fraction(d), share, gain, held)
-    for k in _doubtful(first, other, pair, float(last), by_law=seen is None).tolist():
+    for k in _doubtful(first, other, pair, float(last), by_law=not seen).tolist():
         places = [first[k], first[k + 1], other[k], other[k] if held else other[k + 1]]
-        places += [] if seen is None else [seen[0][k], seen[1][k]]
-        missed[k] = rounded_up(_shortfall(np.stack(places), pair, last if k == len(missed) - 1 else Fraction(1)))
+        views = [[own[k], there[k]] for own, there in seen] or [[]]
+        lasts = last if k == len(missed) - 1 else Fraction(1)
+        missed[k] = rounded_up(min(_shortfall(np.stack([*places, *view]), pair, lasts) for view in views))
     return missed
 
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airground_drake.base.arrays import Array, Flags, Indices
-from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance, part_of_gain
+from airground_drake.model.plants.budget import AT_REST, Bounds, law_distance, of_views, part_of_gain
 from airground_drake.scenario.schema import MAP, Scenario
 from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.trace import Trace, per_trace
@@ -54,7 +54,8 @@ class Pair(NamedTuple):
     # Sum of both bodies' largest distances from their steered points after a period, including the drift of users'
     # plants.
     cover_m: float = 0.0
-    drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands
+    drift_m: float = 0.0  # the part of `more_m` that makes up for missed commands and different views
+    views_m: float = 0.0  # the part for different views alone
     error_m: float = 0.0  # sum of the bounds of the errors of the measured positions
     asynchronous: bool = False  # whether each of two UGVs acts on an old position of the other one
     slip_m: float = 0.0  # how much of its command the robot may miss in a control period
@@ -123,14 +124,15 @@ def pairs_by(
         reach = (own.speed_m_s + (speed or other.speed_m_s)) * period
         row, last = there.get(second, (0, end))
         safe = given.required_m + sum(given.radii_m)
-        part = part_of_gain(own, other)
+        part, views_m = part_of_gain(own, other), float(of_views(safe, own, other, gain=gain))
         drawn = own.cover_m if own.drawn and second in there and not passive else 0.0
         needs_start = drawn or (not passive and (own.late or other.late))
         yield Pair(
             first, second, given.required_m, sum(given.radii_m), share, reach, row, last, speed,
             more_m=float(law_distance(safe, own, other, gain=gain, passive=passive)) - safe,
             cover_m=sum(plant.rolling_m + plant.drift_m_s * period for plant in (own, other)),
-            drift_m=sum(plant.drift_m_s / (gain * part) for plant in (own, other) if plant.drift_m_s),
+            drift_m=sum(plant.drift_m_s / (gain * part) for plant in (own, other) if plant.drift_m_s) + views_m,
+            views_m=views_m,
             error_m=own.error_m + other.error_m,
             asynchronous=given.kind == ASYNCHRONOUS,
             slip_m=own.drift_m_s * period,

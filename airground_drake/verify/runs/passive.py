@@ -105,7 +105,7 @@ def periods_of(trace: Trace, pair: Pair) -> Periods:
             if pair.error_m and of_part.any():
                 seen, there = trace.as_seen(pair.first, pair.first)[which], np.broadcast_to(place, first.shape)[:-1]
                 sure = rounded_up(Fraction(keeps) + Fraction(pair.error_m))
-                as_seen = missing(d=sure, seen=(seen, there))
+                as_seen = missing(d=sure, seen=[(seen, there)])
                 far = away_from(core, seen - there, planar=planar).distance >= sure
                 of_part = np.where(far, np.minimum(of_part, as_seen), of_part)
             missed = np.maximum(missed, of_part)

@@ -15,7 +15,7 @@ from airground_drake.base.errors import PluginError
 from airground_drake.check import safety
 from airground_drake.model.bodies.world import Body
 from airground_drake.model.law import kernels
-from airground_drake.model.plants.budget import Bounds, costs, kept_distance, law_distance, least_gain
+from airground_drake.model.plants.budget import Bounds, costs, kept_distance, law_distance, least_gain, of_views
 from airground_drake.report.possible import impossible
 from airground_drake.scenario.budget import budget
 from airground_drake.scenario.load import from_data, load, resolved
@@ -24,6 +24,8 @@ from airground_drake.sim.diagram import make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge, judge_model
+from airground_drake.verify.claims.safe_hyp import guarantees
+from airground_drake.verify.runs.pairs import pair_of
 
 ERROR_M = 0.05
 
@@ -80,6 +82,27 @@ def test_what_robots_act_on_is_recorded_within_its_bound(errors: str) -> None:
     for k in (0, 7, 61):
         saw = np.array([[trace.sampled(f"{ugv}.uav_saw_{axis}_m")[k] for axis in "xyz"] for ugv in trace.ugvs])
         assert 0.0 < np.linalg.norm(saw - true[k, :2], axis=1).max() <= 0.03
+
+
+def test_robots_that_measure_each_other_pay_for_different_directions(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario, claims = crossing(errors="adversarial", shared=False), ("SAFE-TRACE", "SAFE-HYP")
+    trace = simulate(scenario, "d")
+    assert not np.array_equal(trace.as_seen("ugv1", "ugv2"), trace.as_seen("ugv2", "ugv2"))
+    assert found(trace, *claims) == dict.fromkeys(claims, "holds")
+    assert safety.safe_hyp(checked(trace)).status == "holds"
+    assert [*impossible(trace, scenario)] == []
+    pair = pair_of(trace, "ugv1", "ugv2")
+    missed = max(kept.missed_m.max() for kept in guarantees(trace) if kept.pair == pair)
+    assert 0.01 < missed / (0.5 * 8.0 * 0.05) < pair.views_m  # the share of each, along the direction of the other
+    samples = trace.samples.copy()
+    samples.loc[40, "uav.saw_ugv2_x_m"] = trace.position("ugv2")[trace.sample_rows[40], 0] + ERROR_M + 1e-6
+    assert broken_rules(replace(trace, samples=samples))[1] == "error of the measured position"
+    (verdict,) = judge_model(scenario, claims=["SAFE-BUDGET"])
+    assert (verdict.status, "Budget.own_views" in verdict.evidence["theorems"]) == ("proved", True)
+    right = vars(Body)["bounds"].fget
+    monkeypatch.setattr(Body, "bounds", property(lambda self: right(self)._replace(own_views=False)))
+    wrong = simulate(scenario, "d")
+    assert safety.safe_hyp(checked(wrong)).status == found(wrong, "SAFE-HYP")["SAFE-HYP"] == "refuted"
 
 
 def do_not_pay(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -157,21 +180,25 @@ def test_a_robot_stands_where_inequalities_ask_for_more_than_its_speed_limit() -
 
 
 def any_bounds() -> st.SearchStrategy[Bounds]:
-    numbers = st.tuples(*[st.floats(0.0, 0.3)] * 4, st.floats(0.5, 2.0), st.floats(0.001, 0.3))
-    return numbers.map(lambda given: Bounds(*given[:4], speed_m_s=given[4], error_m=given[5]))
+    numbers = st.tuples(*[st.floats(0.0, 0.3)] * 4, st.floats(0.5, 2.0), st.floats(0.001, 0.3), st.booleans())
+    return numbers.map(lambda given: Bounds(*given[:4], speed_m_s=given[4], error_m=given[5], own_views=given[6]))
 
 
 @examples(60)
 @given(st.floats(0.1, 3.0), any_bounds(), any_bounds() | st.just(Bounds()))
 def test_the_law_keeps_what_the_theorem_asks_for(distance: float, one: Bounds, other: Bounds) -> None:
     """d_law >= err + loss / A' + sqrt(m^2 + err^2), with what the bodies take before errors; and back again."""
+    # With views of their own, 2 V err / (sqrt(m^2 + err^2) - err) is part of the loss.
     gain, part = 5.0, 1.0 if other == Bounds() else 0.5
     law = float(law_distance(distance, one, other, gain=gain))
     error, loss = one.error_m + other.error_m, one.drift_m_s + other.drift_m_s
-    without = [bounds._replace(error_m=0.0, drift_m_s=0.0) for bounds in (one, other)]
+    without = [bounds._replace(error_m=0.0, drift_m_s=0.0, own_views=False) for bounds in (one, other)]
     before = float(law_distance(distance, *without, gain=gain))
+    if one.own_views and other.own_views:
+        loss += 2.0 * max(one.speed_m_s, other.speed_m_s) * error / (np.hypot(before, error) - error)
     assert law == pytest.approx(error + loss / (gain * part) + np.hypot(before, error), rel=1e-12)
-    assert distance * (1.0 - 1e-9) <= kept_distance(law, one, other, gain=gain) + 1e-9 <= distance + 2e-9
+    points = law - float(of_views(distance, one, other, gain=gain))
+    assert distance * (1.0 - 1e-9) <= kept_distance(points, one, other, gain=gain) + 1e-9 <= distance + 2e-9
     total = distance + sum(cost.metres for cost in costs(distance, one, other, gain=gain))
     assert total == pytest.approx(law, rel=1e-12)
     least = least_gain(distance, one, other)
@@ -204,3 +231,33 @@ def test_the_condition_on_the_gain_is_needed(error: float) -> None:
     """Directions that are wrong in each period add up, unless the gain makes up for them."""
     assert orbited(error, 1.0) >= 0.6
     assert orbited(error, 0.2) < 0.6 - 0.1 * error
+
+
+def circled(
+    angle: float, *, own_views: bool, error: float = 0.08, distance: float = 0.6, period: float = 0.05
+) -> float:
+    """The least distance, m, of two robots that circle each other, each as fast as it may along what it sees."""
+    gain, speed, period = 6.0, 1.0, 0.05
+    body = Bounds(error_m=0.5 * error, speed_m_s=speed, own_views=own_views)
+    law = float(law_distance(distance, body, body, gain=gain))
+    apart, nearest = np.array([law, 0.0]), law
+    turned = np.array([[0.0, -1.0], [1.0, 0.0]])
+    for _ in range(400):
+        away = apart / np.linalg.norm(apart)
+        step = np.zeros(2)
+        for side in (1.0, -1.0):  # both see the pair farther apart, each turned to its side
+            seen = apart + error * (np.cos(angle) * away + side * np.sin(angle) * (turned @ away))
+            length = float(np.linalg.norm(seen))
+            normal, lacks = seen / length, law - length
+            rate = 0.5 * (gain * lacks if lacks >= 0.0 else lacks / period)
+            step += period * (rate * normal + side * np.sqrt(max(speed**2 - rate**2, 0.0)) * (turned @ normal))
+        share = float(np.clip(-(apart @ step) / max(step @ step, 1e-12), 0.0, 1.0))
+        nearest = min(nearest, float(np.linalg.norm(apart + share * step)))
+        apart = apart + step
+    return nearest
+
+
+def test_different_directions_cost_distance() -> None:
+    angles = np.linspace(0.1, 1.5, 8)
+    assert min(circled(angle, own_views=True) for angle in angles) >= 0.6
+    assert min(circled(angle, own_views=False) for angle in angles) < 0.59
