@@ -104,11 +104,11 @@ def remarks(judged: Judged) -> Iterator[str]:
 
 def source(name: str, tracks: Tracks) -> str:
     track = tracks.bodies[name]
-    frame = f" in frame {track.told['frame']}" if track.told.get("frame") else ""
-    clock = f", by {track.told['clock']}" if track.told.get("clock") else ""
+    frame = f" in frame {track.origin['frame']}" if track.origin.get("frame") else ""
+    clock = f", by {track.origin['clock']}" if track.origin.get("clock") else ""
     lasts = float(track.t_s[-1] - track.t_s[0])
     rate = f", {(len(track.t_s) - 1) / lasts:.3g} per second" if lasts else ""
-    return f"{len(track.t_s)} positions{rate}, of {track.told.get('stream', name)}{frame}{clock}"
+    return f"{len(track.t_s)} positions{rate}, of {track.origin.get('stream', name)}{frame}{clock}"
 
 
 def not_judged(judged: Judged) -> Iterator[str]:
@@ -128,7 +128,7 @@ def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
     yield from (f"{name}: {source(name, tracks)}" for name in tracks.bodies)
     if tracks.origin:
         yield f"Time 0 is {tracks.origin}."
-    told = [*tracks.said, *remarks(judged)]
+    told = [*tracks.remarks, *remarks(judged)]
     yield from (f"Note: {remark}" for remark in told[:MOST_SAID])
     if len(told) > MOST_SAID:
         yield f"Note: {len(told) - MOST_SAID} more; --json has all"
