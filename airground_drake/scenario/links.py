@@ -13,6 +13,5 @@ def make_qualities(channel: Channel) -> tuple[Quality, Quality]:
 
 
 def make_links(channel: Channel) -> tuple[Link, Link]:
-    """The links from the UAV to UGVs, and back."""
     down, up = make_qualities(channel)
     return Link(down, channel.seed, "down"), Link(up, channel.seed, "up")

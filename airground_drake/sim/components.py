@@ -143,7 +143,6 @@ def make_movers(scenario: Scenario) -> tuple[Mover, ...]:
 
 
 def make_route(scenario: Scenario) -> Route:
-    """The solver route of the gatekeeper's problem (26)."""
     gate = scenario.gatekeeper
     chosen: dict[str, Any] = {"blocks": gate.blocks} if gate.blocks else {}
     if gate.solver != "daqp":
@@ -178,13 +177,11 @@ def make_rules(scenario: Scenario) -> Rules:
 
 
 def make_outlook(scenario: Scenario) -> Outlook:
-    """The horizon of predicted outcomes."""
     gate = scenario.gatekeeper
     return Outlook(gate.longest_s, gate.settling_s, gate.horizon_s, scenario.arrival_tolerance_m)
 
 
 def make_patience(scenario: Scenario) -> Patience:
-    """The limits of how often and how long UGVs follow the UAV."""
     gate = scenario.gatekeeper
     return Patience(gate.tries, gate.rest_s, gate.longest_s)
 

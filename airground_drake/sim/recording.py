@@ -185,7 +185,6 @@ _BLANK: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in 
 
 
 def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str, Any]:
-    """A row of `Trace.decisions`."""
     rested_on = decision.basis
     row: dict[str, Any] = _BLANK | {
         "t_s": decision.t,
@@ -235,7 +234,6 @@ def _word(accepts: bool) -> str:
 
 
 def problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:
-    """`Trace.problems` of the decisions."""
 
     def flat(array: Array | None) -> list[float]:
         return [] if array is None else array.ravel().tolist()
@@ -260,7 +258,6 @@ def _sent(memories: Iterable[PlannerState]) -> list[tuple[int, Proposal]]:
 
 
 def proposals(ugvs: Sequence[str], memories: Iterable[PlannerState]) -> pd.DataFrame:
-    """`Trace.proposals` from the planners' memories."""
     rows = [
         (
             proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
@@ -275,7 +272,6 @@ def proposals(ugvs: Sequence[str], memories: Iterable[PlannerState]) -> pd.DataF
 
 
 def plans(memories: Mapping[str, PlannerState], ugvs: Sequence[str]) -> pd.DataFrame:
-    """`Trace.plans` from the planners' memories."""
     numbers = {(proposal.issued, ugvs[i]): proposal.number for i, proposal in _sent(memories.values())}
     rows = [
         {

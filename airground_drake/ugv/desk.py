@@ -32,7 +32,6 @@ class Desk(Immutable):
 
     @classmethod
     def empty(cls, count: int) -> Desk:
-        """The initial state of `count` UGVs."""
         return cls((None,) * count, (-1,) * count, (None,) * count)
 
 
@@ -87,7 +86,6 @@ class Obeying(Immutable):
 
     @classmethod
     def empty(cls, count: int) -> Obeying:
-        """The initial state of `count` UGVs."""
         return cls(Desk.empty(count), (Report(),) * count)
 
     def after(self, arrived: Sequence[Delivery]) -> Obeying:

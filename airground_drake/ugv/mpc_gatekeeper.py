@@ -61,7 +61,6 @@ class GatekeeperState(Immutable):
 
     @classmethod
     def empty(cls, count: int, *, channel: bool = False) -> GatekeeperState:
-        """The initial memory of `count` UGVs."""
         held = (Commitment(),) * count
         desk = Desk.empty(count) if channel else None
         return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held, desk=desk)
@@ -226,11 +225,9 @@ class PaperGatekeepers(Gatekeepers):
 
     @property
     def judges(self) -> str:
-        """Name of the route's class."""
         return type(self._route).__name__
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
-        """Judge every proposal in force by (26)."""
         since: list[float] = []
         judged: list[tuple[GatekeeperDecision, float]] = []
         budgets = self._rules.budgets(sum(p is not None for p in now.proposals))

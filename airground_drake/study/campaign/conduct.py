@@ -46,7 +46,6 @@ def conduct(
     engine: Engine = "batch",
     progress: Progress = SILENT,
 ) -> dict[str, Any]:
-    """Finish a campaign, and write the evidence and its page."""
     # folder: new or empty; with `resume`, a folder with a part of the same campaign.
     # number: of draws; default: all combinations of the grids.
     if stopping is not None and spec.dependent:

@@ -61,7 +61,6 @@ class Stream:
 
     @property
     def label(self) -> str:
-        """Its name in messages."""
         return f"{self.name} ({self.child})" if self.child and self.child != self.name else self.name
 
     def ns(self, unit: str) -> Whole:

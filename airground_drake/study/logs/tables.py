@@ -41,7 +41,6 @@ class Wanted(NamedTuple):
 
 
 def read(path: Path, content: bytes, wanted: Wanted) -> Log:
-    """The streams of a table: a text, or Parquet."""
     table = _parquet(content) if content[:4] == b"PAR1" else text.read(content)
     labels = table.labels
     no_words = all(not line.strip() or line.lstrip().startswith("#") for line in table.above)

@@ -55,7 +55,6 @@ class MixedIntegerRoute:
     """
 
     def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
-        """Choose blocks and solver."""
         # blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
         if blocks is not None and blocks < 1:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
