@@ -92,6 +92,7 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
     distances.sort(key=lambda named: named[1].margin_m)
     plates = grouped((figure.beside or PLACES.get(figure.id, "happened"), figure) for figure in figures)
     diagram = _diagram(diagram_svg, report.scenario.name)
+    resting = grouped(dict.fromkeys((assumed, claim.id) for claim in report.claims for assumed in claim.assumptions))
     sections = {
         "happened": bool(report.runs),
         "safe": bool(distances),
@@ -112,7 +113,7 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
         groups=_by_claim(report.claims),
         outcomes=list(dict.fromkeys(map(_shown, report.claims))),
         attention=attention.items(report),
-        assumptions=_assumptions(report.claims),
+        assumptions=dict(sorted(resting.items(), key=lambda item: -len(item[1]))),
         distances=distances[:MAX_DISTANCE_ROWS],
         left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
     )  # fmt: skip
@@ -223,11 +224,6 @@ def _together(members: Sequence[Claim]) -> list[tuple[Claim, str]]:
     alike = grouped(((_shown(claim), claim.as_expected or claim.expected), claim) for claim in members)
     names = [(those[0], [claim.run for claim in those if claim.run]) for those in alike.values()]
     return [(claim, f"all {runs}" if len(where) == runs > 1 else ", ".join(where)) for claim, where in names]
-
-
-def _assumptions(claims: Sequence[Claim]) -> dict[str, list[str]]:
-    resting = grouped(dict.fromkeys((assumed, claim.id) for claim in claims for assumed in claim.assumptions))
-    return dict(sorted(resting.items(), key=lambda item: -len(item[1])))
 
 
 def page(report: Report, figures: Sequence[Figure], diagram_svg: str | None) -> str:

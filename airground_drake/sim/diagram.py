@@ -312,17 +312,15 @@ def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) ->
     velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(sum(sizes), 3))
     for body, plant in plants.items():
         builder.AddNamedSystem(f"{body}_plant", plant)
-    bodies = builder.AddNamedSystem("bodies", Multiplexer([3] * len(plants)))
-    for i, plant in enumerate(plants.values()):
-        builder.Connect(plant.get_output_port(0), bodies.get_input_port(i))
-        if i < len(world.robots):
-            builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
+    bodies = together(builder, "bodies", [plant.get_output_port(0) for plant in plants.values()])
+    for i, robot in enumerate(world.robots):
+        builder.Connect(velocities.get_output_port(i), plants[robot].get_input_port(0))
     builder.Connect(commanded, velocities.get_input_port())
     for i, kind in enumerate(ROBOTS):
         builder.ExportInput(team_command.get_input_port(i), f"{kind}_command")
     for robot in world.robots if disturbed else ():
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
-    builder.ExportOutput(bodies.get_output_port(), "bodies")
+    builder.ExportOutput(bodies, "bodies")
     builder.ExportOutput(team_command.get_output_port(), "team_command")
     signals = [port for plant in plants.values() for port in outputs_of(plant) if port.get_name() == "signals"]
     if signals:
