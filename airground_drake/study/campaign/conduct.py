@@ -70,8 +70,8 @@ def conduct(
             rows = died(index) if judged is None else judged
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
-            told = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
-            progress.advance(1.0, f"refuted: {told or 'nothing'}")
+            counts = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
+            progress.advance(1.0, f"refuted: {counts or 'nothing'}")
             if stopping is not None and stopping.met_in_order(index, rows):
                 break
         table = store.table()

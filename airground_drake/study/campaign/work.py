@@ -170,12 +170,12 @@ def _agree(screens: Sequence[Verdict], verdicts: Sequence[Verdict], trace: Trace
         numbers = [float("nan") if verdict.margin is None else verdict.margin for verdict in (ours, theirs)]
         same = (ours.status, ours.exercised) == (theirs.status, theirs.exercised)
         if not same or not np.isclose(numbers[0], numbers[1], rtol=0.0, atol=SAME, equal_nan=True):
-            told = [
+            words = [
                 f"{verdict.status}, margin {verdict.margin}, {verdict.exercised} times" for verdict in (ours, theirs)
             ]
             where = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}"
-            said = f"{where}: {ours.claim.id} is {told[1]} by the trace and {told[0]} by the array judge"
-            raise DifferenceError(f"{said}; --engine drake does without")
+            difference = f"{where}: {ours.claim.id} is {words[1]} by the trace and {words[0]} by the array judge"
+            raise DifferenceError(f"{difference}; --engine drake does without")
 
 
 def _compared(trace: Trace, by_drake: Trace) -> str:
@@ -186,8 +186,8 @@ def _compared(trace: Trace, by_drake: Trace) -> str:
         return CLOCK
     if (difference := first_difference(by_drake, trace)) is not None:
         about, drakes, ours = difference
-        told = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"
-        raise DifferenceError(f"{told} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")
+        quantity = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"
+        raise DifferenceError(f"{quantity} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")
     return BOTH
 
 

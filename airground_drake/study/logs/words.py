@@ -52,20 +52,20 @@ def least(pair: JudgedPair) -> str:
 
 
 def spans(those: Sequence[Span]) -> str:
-    told = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those]
-    return some(told, MOST_SPANS)
+    periods = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those]
+    return some(periods, MOST_SPANS)
 
 
 def doing(pair: JudgedPair) -> str:
-    told = []
+    moves = []
     for name, came in sorted(pair.came_m.items(), key=lambda item: -item[1]):
         if came >= LEAST_TOLD_M:
-            told.append(f"{name} came {came:.3f} m nearer")
+            moves.append(f"{name} came {came:.3f} m nearer")
         elif came <= -LEAST_TOLD_M:
-            told.append(f"{name} moved {-came:.3f} m away")
+            moves.append(f"{name} moved {-came:.3f} m away")
         else:
-            told.append(f"{name} moved neither nearer nor away")
-    return f"in the second before, {', '.join(told)}"
+            moves.append(f"{name} moved neither nearer nor away")
+    return f"in the second before, {', '.join(moves)}"
 
 
 def law(pair: JudgedPair) -> str:
@@ -95,9 +95,9 @@ def remarks(judged: Judged) -> Iterator[str]:
             yield f"{name} moves at up to {speed:.3g} m/s, above its limit of {limit:g} m/s"
     near = min((pair.safe_m for pair in judged.pairs), default=0.0)
     if off := {name: away for name, away in judged.away_m.items() if away > max(near, ELSEWHERE_M)}:
-        told = ", ".join(f"{name} by {away:.3g} m" for name, away in off.items())
+        shifts = ", ".join(f"{name} by {away:.3g} m" for name, away in off.items())
         yield (
-            f"robots do not start as in the scenario: {told}; if the log is in another frame, its distances to "
+            f"robots do not start as in the scenario: {shifts}; if the log is in another frame, its distances to "
             "obstacles are meaningless"
         )
 
@@ -128,10 +128,10 @@ def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
     yield from (f"{name}: {source(name, tracks)}" for name in tracks.bodies)
     if tracks.origin:
         yield f"Time 0 is {tracks.origin}."
-    told = [*tracks.remarks, *remarks(judged)]
-    yield from (f"Note: {remark}" for remark in told[:MOST_SAID])
-    if len(told) > MOST_SAID:
-        yield f"Note: {len(told) - MOST_SAID} more; --json has all"
+    notes = [*tracks.remarks, *remarks(judged)]
+    yield from (f"Note: {remark}" for remark in notes[:MOST_SAID])
+    if len(notes) > MOST_SAID:
+        yield f"Note: {len(notes) - MOST_SAID} more; --json has all"
     if tracks.ignored:
         more = f"; and {len(tracks.ignored) - MOST_SAID} more" if len(tracks.ignored) > MOST_SAID else ""
         yield f"Not used: {'; '.join(tracks.ignored[:MOST_SAID])}{more}"
