@@ -26,7 +26,7 @@ from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.model import Claim, Report
 from airground_drake.report.proved import place
 from airground_drake.report.screen import first_screen
-from airground_drake.report.sentences import MARKS, grouped, number, split, told, unbroken
+from airground_drake.report.sentences import MARKS, as_text, grouped, number, split, unbroken
 from airground_drake.report.view import canvas, svg
 from airground_drake.ugv.reasons import WORDS
 from airground_drake.verify.finding import Chart
@@ -131,7 +131,7 @@ def environment() -> Environment:
     style = stylesheet()
     script = _template(SCRIPT)
     environment.filters.update(
-        num=number, told=told, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
+        num=number, as_text=as_text, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=tables, unbroken=unbroken,
     )  # fmt: skip
     environment.globals.update(
@@ -295,7 +295,7 @@ def in_words(key: str) -> str:
 
 
 def _cell(value: Any) -> str:
-    text = told(value)
+    text = as_text(value)
     return text if len(text) <= MAX_CELL_CHARS else f"{text[:MAX_CELL_CHARS]}…"
 
 

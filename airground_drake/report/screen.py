@@ -147,7 +147,7 @@ def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
             rule.mark, [rule.words, f"the check: {(judged.status if judged.id else 'not made').replace('_', ' ')}"]
         )
     as_declared = " (as declared)" if judged.status == "refuted" and judged.as_expected is True else ""
-    lines = [rule.words + as_declared, *(breach.told for breach in run.breaches[:1])]
+    lines = [rule.words + as_declared, *(breach.line for breach in run.breaches[:1])]
     if run.collided and len(run.breaches) > 1:
         lines.append(counted(len(run.breaches) - 1, "more collision"))
     if run.others_too_close:

@@ -401,14 +401,14 @@ def make_monitor(
     """
     scenario = validated(scenario)
     if scenario.ugv_controller is not None:
-        told = f"ugv_controller {scenario.ugv_controller.kind!r} has no law that is known here"
-        raise PluginError(f"{told}; allowed for a monitor: a scenario without one")
+        cause = f"ugv_controller {scenario.ugv_controller.kind!r} has no law that is known here"
+        raise PluginError(f"{cause}; allowed for a monitor: a scenario without one")
     if scenario.sensing is not None:
-        told = f"sensing of scenario {scenario.name!r} has errors, and a monitor sees true positions"
-        raise PluginError(f"{told}; allowed: a scenario without sensing")
+        cause = f"sensing of scenario {scenario.name!r} has errors, and a monitor sees true positions"
+        raise PluginError(f"{cause}; allowed: a scenario without sensing")
     if scenario.ugv_links is not None:
-        told = f"channel.ugvs of scenario {scenario.name!r} says what UGVs know, and a monitor sees true positions"
-        raise PluginError(f"{told}; allowed: a scenario without it")
+        cause = f"channel.ugvs of scenario {scenario.name!r} says what UGVs know, and a monitor sees true positions"
+        raise PluginError(f"{cause}; allowed: a scenario without it")
     chosen, composition = _chosen(scenario, method, composition)
     world = make_world(scenario)
     ugvs = UgvController(world, components.make_law(scenario, chosen, composition))

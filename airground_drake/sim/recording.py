@@ -328,8 +328,8 @@ def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[s
     withdrawn = sorted((gone for memory in memories for gone in memory.withdrawn), key=lambda gone: gone[1])
     for count, (number, t) in enumerate(withdrawn):
         yield row("withdrawal", count, number, t, t)
-    told = trace.decisions[trace.decisions["answer"] >= 0]
-    for t, answer, number in zip(*(told[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
+    answers = trace.decisions[trace.decisions["answer"] >= 0]
+    for t, answer, number in zip(*(answers[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
         yield row("answer", answer, number, t, read.get(answer, never))
 
 
@@ -370,11 +370,11 @@ def _row(
 
 def faults(memories: Mapping[str, PlannerState]) -> list[dict[str, Any]]:
     """Entries of `Trace.meta["faults"]`; the first fault of each policy has a traceback, if it is known."""
-    told, entries = set[str](), []
+    shown, entries = set[str](), []
     for fault in (asking for _, asking in _asked(memories) if asking.what):
         entry = {"t_s": fault.t, "robot": fault.robot, "policy": fault.policy, "what": fault.what}
-        if fault.traceback and fault.policy not in told:
+        if fault.traceback and fault.policy not in shown:
             entry["traceback"] = fault.traceback
-            told.add(fault.policy)
+            shown.add(fault.policy)
         entries.append(entry)
     return entries

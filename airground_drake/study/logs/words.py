@@ -7,13 +7,13 @@ from airground_drake.report.sentences import some
 from airground_drake.study.logs.judging import BROKEN, KEPT, OPEN, Judged, JudgedPair
 from airground_drake.study.logs.tracks import Span, Tracks
 
-LEAST_TOLD_M = 0.0005  # smaller approaches do not count, m
+LEAST_MOVE_M = 0.0005  # smaller approaches do not count, m
 # A robot that starts farther away from its start in the scenario, and from its safe distance, is named, m.
 ELSEWHERE_M = 0.05
 FASTER = 1.01  # a robot faster than this multiple of its limit is named; less may be position noise
 LONGER = 1.01  # a log longer than the scenario by more than this gets a remark
 # Broken pairs, all pairs, stretches of one pair, and remarks that are printed; `--json` and the page have all.
-MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
+MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_NOTES = 3, 20, 4, 12
 
 
 def headline(judged: Judged) -> str:
@@ -59,9 +59,9 @@ def spans(those: Sequence[Span]) -> str:
 def doing(pair: JudgedPair) -> str:
     moves = []
     for name, came in sorted(pair.came_m.items(), key=lambda item: -item[1]):
-        if came >= LEAST_TOLD_M:
+        if came >= LEAST_MOVE_M:
             moves.append(f"{name} came {came:.3f} m nearer")
-        elif came <= -LEAST_TOLD_M:
+        elif came <= -LEAST_MOVE_M:
             moves.append(f"{name} moved {-came:.3f} m away")
         else:
             moves.append(f"{name} moved neither nearer nor away")
@@ -129,12 +129,12 @@ def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
     if tracks.origin:
         yield f"Time 0 is {tracks.origin}."
     notes = [*tracks.remarks, *remarks(judged)]
-    yield from (f"Note: {remark}" for remark in notes[:MOST_SAID])
-    if len(notes) > MOST_SAID:
-        yield f"Note: {len(notes) - MOST_SAID} more; --json has all"
+    yield from (f"Note: {remark}" for remark in notes[:MOST_NOTES])
+    if len(notes) > MOST_NOTES:
+        yield f"Note: {len(notes) - MOST_NOTES} more; --json has all"
     if tracks.ignored:
-        more = f"; and {len(tracks.ignored) - MOST_SAID} more" if len(tracks.ignored) > MOST_SAID else ""
-        yield f"Not used: {'; '.join(tracks.ignored[:MOST_SAID])}{more}"
+        more = f"; and {len(tracks.ignored) - MOST_NOTES} more" if len(tracks.ignored) > MOST_NOTES else ""
+        yield f"Not used: {'; '.join(tracks.ignored[:MOST_NOTES])}{more}"
     yield "Least margins first, distances between surfaces:"
     for pair in judged.pairs[:MOST_PAIRS]:
         part = f"; covered {pair.covered_s:.6g} s" if pair.gaps_s else ""

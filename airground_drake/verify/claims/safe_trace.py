@@ -81,7 +81,7 @@ class SafeTrace(TraceClaim):
         both = (worst.first, worst.second)
         against: dict[str, Any] | None = None
         if not safe:
-            why = next(encounter.told(trace) for encounter in encounters(trace) if encounter[:2] == both)
+            why = next(encounter.cause(trace) for encounter in encounters(trace) if encounter[:2] == both)
             against = asdict(worst) | _place(trace, worst) | {"why": why} | snapshot(trace, both, worst.t_s)
         return Finding(
             "holds" if safe else "refuted",
