@@ -166,8 +166,8 @@ def declared(
     if ugv_controller is not None:
         other = isinstance(ugv_controller, type) and not issubclass(ugv_controller, System)
         if other or not callable(ugv_controller):
-            given = short(repr(ugv_controller))
-            raise PluginError(f"ugv_controller is {given}; allowed: a subclass of Drake's System, or a function")
+            shown = short(repr(ugv_controller))
+            raise PluginError(f"ugv_controller is {shown}; allowed: a subclass of Drake's System, or a function")
         changed.ugv_controller = OwnController(kind=name_of(ugv_controller))
     return validated(changed, {} if seed is None else {"seed": seed})
 
