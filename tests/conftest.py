@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import shutil
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,6 +20,8 @@ from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.ugv import mpc_gatekeeper, outcome_gatekeeper
+from airground_drake.verify.proofs import THEOREMS, coq
+from airground_drake.verify.proofs.record import file_of
 
 if TYPE_CHECKING:
     from airground_drake.study.testing.plugin import Simulations
@@ -119,6 +122,38 @@ def report(shared: Path) -> Callable[[str], Path]:
             assert write_report([scenario, "-o", str(folder)]) == 0
 
     return lambda scenario: once(shared / f"report-{scenario}", lambda folder: make(scenario, folder))
+
+
+@pytest.fixture(scope="session")
+def coq_version() -> str:
+    """The installed Coq; without one a test is skipped, but in continuous integration it fails."""
+    if shutil.which("coqc") is None and not os.environ.get("CI"):
+        pytest.skip("Coq is not installed")
+    return coq.version()
+
+
+@pytest.fixture(scope="session")
+def compiled(shared: Path, coq_version: str) -> Path:
+    """All theories, which take a minute."""
+
+    def make(folder: Path) -> None:
+        folder.mkdir()
+        coq.install(dict.fromkeys(map(file_of, THEOREMS)), folder)
+
+    return once(shared / "theories", make)
+
+
+@pytest.fixture
+def compiled_before(compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`coqc` of this and other processes takes what the session has compiled of the same file."""
+    wrapper = tmp_path / "bin" / "coqc"
+    wrapper.parent.mkdir()
+    wrapper.write_text(
+        f'#!/bin/sh\nfor file; do :; done\nif cmp -s "$file" "{compiled}/$file"; then\n'
+        f'  cp "{compiled}/${{file%.v}}".vo* .\nelse\n  exec "{shutil.which("coqc")}" "$@"\nfi\n'
+    )
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{wrapper.parent}{os.pathsep}{os.environ['PATH']}")
 
 
 @pytest.fixture

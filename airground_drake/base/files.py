@@ -283,5 +283,4 @@ def strict(value: Any, of_others: Callable[[float], Any] = lambda _: None) -> An
 
 
 def sha256(data: bytes) -> str:
-    """Hexadecimal SHA-256 of the data."""
     return hashlib.sha256(data).hexdigest()

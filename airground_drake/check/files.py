@@ -64,7 +64,6 @@ def read_bytes(path: Path) -> bytes:
 
 
 def sha256(content: bytes) -> str:
-    """Hexadecimal SHA-256."""
     return hashlib.sha256(content).hexdigest()
 
 

@@ -52,7 +52,6 @@ class Run:
 
     @cached_property
     def robots(self) -> dict[str, Json]:
-        """The scenario's entry of each robot."""
         return robots_of(self.scenario)
 
     @cached_property

@@ -141,13 +141,13 @@ def _summary(result: dict[str, Any], *, looked: bool) -> str:
     ended = ", ".join(f"{count} {name}" for name, count in result["ended"].items())
     lines = [f"{result['name']}: {result['draws']} draws ({ended}), {result['simulated_s']:.0f} s simulated"]
     for claim in result["claims"]:
-        said = f"{claim['refuted']} of {claim['tested']} refuted"
+        outcome = f"{claim['refuted']} of {claim['tested']} refuted"
         if not claim["tested"]:
-            said += ", not tested by any run"
+            outcome += ", not tested by any run"
         elif bounds := claim["anytime" if looked else "fixed"]:
-            said += f", probability of a violation {bounds[0]:.2g} to {bounds[1]:.2g}"
+            outcome += f", probability of a violation {bounds[0]:.2g} to {bounds[1]:.2g}"
         differs = f"; {claim['differs']} not as expected" if claim["differs"] else ""
-        lines.append(f"  {claim['run']:10} {claim['claim']:12} {said}{differs}")
+        lines.append(f"  {claim['run']:10} {claim['claim']:12} {outcome}{differs}")
     for swept in result.get("swept", ()):
         lines += [f"  by {swept['key']}:", *map(_by_value, swept["entries"])]
     if result["dependent"]:
@@ -165,7 +165,7 @@ def _by_value(entry: dict[str, Any]) -> str:
         for name, words in (("first_trigger_s", "first trigger"), ("arrival_s", "last arrival"))
         if entry[name] is not None
     ]
-    said = [f"{entry['arrived']} of {entry['ugvs']} arrived", *times]
+    parts = [f"{entry['arrived']} of {entry['ugvs']} arrived", *times]
     if refuted:
-        said.append(f"refuted: {', '.join(refuted)}")
-    return f"    {entry['value']!s:10} {entry['run']:10} {'; '.join(said)}"
+        parts.append(f"refuted: {', '.join(refuted)}")
+    return f"    {entry['value']!s:10} {entry['run']:10} {'; '.join(parts)}"

@@ -73,7 +73,6 @@ def _about(kind: type, name: str) -> list[str]:
 
 
 def _print_keys(beginning: str) -> int:
-    """Print the keys of a scenario below a dotted key."""
     from airground_drake.scenario.json_schema import scenario_schema
     from airground_drake.scenario.keys import sections
 

@@ -63,11 +63,11 @@ def finish(
     report = document.build(
         scenario, traces, verdicts, origin, audit=findings, audited=audited, required=required, seeds=of_seeds
     )
-    told = model.of(report)
+    report_model = model.of(report)
     if "junit" in formats:
-        pages[PAGES["junit"]] = junit.render(told)
+        pages[PAGES["junit"]] = junit.render(report_model)
     if "html" in formats:
-        pages[PAGES["html"]] = page(told, figures, pages["diagram.svg"])
+        pages[PAGES["html"]] = page(report_model, figures, pages["diagram.svg"])
     folder.clear(output)
     written = [*pages]
     for name, of_run in traces.items():

@@ -22,7 +22,7 @@ class Breach(NamedTuple):
 
     first: str
     second: str
-    told: str
+    line: str
     doing: str = ""
 
 

@@ -26,7 +26,7 @@ from airground_drake.report.figures.panels import Figure, Table
 from airground_drake.report.model import Claim, Report
 from airground_drake.report.proved import place
 from airground_drake.report.screen import first_screen
-from airground_drake.report.sentences import MARKS, grouped, number, split, told, unbroken
+from airground_drake.report.sentences import MARKS, as_text, grouped, number, split, unbroken
 from airground_drake.report.view import canvas, svg
 from airground_drake.ugv.reasons import WORDS
 from airground_drake.verify.finding import Chart
@@ -92,6 +92,7 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
     distances.sort(key=lambda named: named[1].margin_m)
     plates = grouped((figure.beside or PLACES.get(figure.id, "happened"), figure) for figure in figures)
     diagram = _diagram(diagram_svg, report.scenario.name)
+    resting = grouped(dict.fromkeys((assumed, claim.id) for claim in report.claims for assumed in claim.assumptions))
     sections = {
         "happened": bool(report.runs),
         "safe": bool(distances),
@@ -112,7 +113,7 @@ def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = 
         groups=_by_claim(report.claims),
         outcomes=list(dict.fromkeys(map(_shown, report.claims))),
         attention=attention.items(report),
-        assumptions=_assumptions(report.claims),
+        assumptions=dict(sorted(resting.items(), key=lambda item: -len(item[1]))),
         distances=distances[:MAX_DISTANCE_ROWS],
         left_out=max(0, len(distances) - MAX_DISTANCE_ROWS),
     )  # fmt: skip
@@ -130,7 +131,7 @@ def environment() -> Environment:
     style = stylesheet()
     script = _template(SCRIPT)
     environment.filters.update(
-        num=number, told=told, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
+        num=number, as_text=as_text, yaml=as_yaml, together=attention.faults_together, inline=Markup, mathml=mathml,
         evidence=evidence_tables, proof=place, records=tables, unbroken=unbroken,
     )  # fmt: skip
     environment.globals.update(
@@ -225,11 +226,6 @@ def _together(members: Sequence[Claim]) -> list[tuple[Claim, str]]:
     return [(claim, f"all {runs}" if len(where) == runs > 1 else ", ".join(where)) for claim, where in names]
 
 
-def _assumptions(claims: Sequence[Claim]) -> dict[str, list[str]]:
-    resting = grouped(dict.fromkeys((assumed, claim.id) for claim in claims for assumed in claim.assumptions))
-    return dict(sorted(resting.items(), key=lambda item: -len(item[1])))
-
-
 def page(report: Report, figures: Sequence[Figure], diagram_svg: str | None) -> str:
     of_audit = findings.draw([finding.model_dump() for finding in report.audit])
     return render(report, [*figures, *_of_claims(report), *of_audit], diagram_svg)
@@ -299,7 +295,7 @@ def in_words(key: str) -> str:
 
 
 def _cell(value: Any) -> str:
-    text = told(value)
+    text = as_text(value)
     return text if len(text) <= MAX_CELL_CHARS else f"{text[:MAX_CELL_CHARS]}…"
 
 

@@ -49,9 +49,9 @@ def _outcome(case: ET.Element, claim: Claim) -> None:
     idle = outcome(claim.status, claim.exercised) == NOT_EXERCISED
     status = f"{claim.status}, nothing to check (0 {claim.exercised_by})" if idle else claim.status
     if claim.as_expected is not False:
-        told = f"{status}, nothing promised" if claim.as_expected is None else status if idle else ""
-        if told:
-            ET.SubElement(case, "skipped", {"message": _text(f"{told}: {claim.statement}")})
+        skipped = f"{status}, nothing promised" if claim.as_expected is None else status if idle else ""
+        if skipped:
+            ET.SubElement(case, "skipped", {"message": _text(f"{skipped}: {claim.statement}")})
         return
     margin = "" if claim.margin is None else f", margin {claim.margin:.4g} {claim.unit}".rstrip()
     if margin and claim.quantity:

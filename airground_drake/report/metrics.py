@@ -17,7 +17,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S, Way, moved_at_the_end
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.pair_kinds import MOVING, kind_of
-from airground_drake.verify.runs.gate_record import without_decisions
+from airground_drake.verify.runs.gate_record import reasons_of, without_decisions
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
     Gap,
@@ -218,7 +218,7 @@ def gatekeeper(trace: Trace) -> dict[str, Any] | None:
         "decisions": {str(name): int(count) for name, count in table["decision"].value_counts().sort_index().items()},
         "solver_failures": int((table["status"] == "solver_failed").sum()),
         "refusals": _refusals(trace),
-        "reasons": {str(reason): int(count) for reason, count in table["reason"].value_counts().items()},
+        "reasons": reasons_of(trace),
         "farthest_from_prediction": farthest_from_prediction(trace),
         "budget_spent": int((table["status"] == "budget_spent").sum()),
         "max_gap": float(known.max()) if len(known) else None,

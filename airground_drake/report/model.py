@@ -92,9 +92,9 @@ class Approach(Distance):
     @property
     def line(self) -> str:
         """The pair, its distance beside the required one, and when: a line of the first screen."""
-        told = metres(self.value, self.safe_distance_m).removesuffix(" m")
+        apart = metres(self.value, self.safe_distance_m).removesuffix(" m")
         sign = "<" if self.is_short else "≥"
-        apart = f"overlap {told[1:]} m" if told.startswith("-") else f"{told} {sign} {self.safe_distance_m:g} m"
+        apart = f"overlap {apart[1:]} m" if apart.startswith("-") else f"{apart} {sign} {self.safe_distance_m:g} m"
         return f"{self.first}\N{EN DASH}{self.whom} {apart} at {f'{self.t_s:.2f} s' if self.t_s > 0.0 else 'the start'}"
 
 

@@ -12,8 +12,8 @@ def named(body: str, at_m: Sequence[float] | None = None) -> str:
 
 def distance(value_m: float, required_m: float) -> str:
     """A distance in words, below 0 as an overlap."""
-    told = metres(value_m, required_m)
-    return f"{told} (overlap)" if told.startswith("-") else told
+    apart = metres(value_m, required_m)
+    return f"{apart} (overlap)" if apart.startswith("-") else apart
 
 
 def metres(value_m: float, required_m: float, decimals: int = 3) -> str:

@@ -55,8 +55,8 @@ def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
         uav, ugv = (row["receiver"], row["sender"]) if row["kind"] == "answer" else (row["sender"], row["receiver"])
         of_uav, t_s, number = scenario.aerial.get(uav), row["sent_s"], int(row["number"])
         if of_uav is None or ugv not in scenario.in_charge(uav) or not 0.0 <= t_s <= trace.t[-1]:
-            said = f"{row['sender']} to {row['receiver']}"
-            yield f"who sends {row['kind']} {number}", t_s, said, "a UAV and one of its UGVs, in the run"
+            robots = f"{row['sender']} to {row['receiver']}"
+            yield f"who sends {row['kind']} {number}", t_s, robots, "a UAV and one of its UGVs, in the run"
             continue
         by_uav, until_s = row["read_s"] if row["kind"] == "answer" else t_s, of_uav.lost_at_s or math.inf
         if by_uav >= until_s - SAME_S:
@@ -67,13 +67,13 @@ def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
         if original != (ugv, uav, original[2], row["about"]):
             yield f"number of the proposal that {row['kind']} {number} is about", t_s, row["about"], original[3]
     listed = (trace.proposals[name].tolist() for name in ("number", "robot", "sender", "issued_s", "number"))
-    due = {("proposal", number): tuple(of_proposal) for number, *of_proposal in zip(*listed, strict=True)}
+    expected = {("proposal", number): tuple(of_proposal) for number, *of_proposal in zip(*listed, strict=True)}
     charge = {ugv: uav for uav in scenario.aerial for ugv in scenario.in_charge(uav)}
     listed = (trace.decisions[name].tolist() for name in ("answer", "robot", "t_s", "number"))
-    due |= {("answer", k): (ugv, charge.get(ugv), *said) for k, ugv, *said in zip(*listed, strict=True) if k >= 0}
+    expected |= {("answer", k): (ugv, charge.get(ugv), *rest) for k, ugv, *rest in zip(*listed, strict=True) if k >= 0}
     answers = [key for key in first if key[0] == "answer" and scenario.channel is None]
-    for key in dict.fromkeys([*due, *answers]):
-        theirs, ours = first.get(key), due.get(key)
+    for key in dict.fromkeys([*expected, *answers]):
+        theirs, ours = first.get(key), expected.get(key)
         if theirs != ours:
             yield f"sending of {key[0]} {key[1]}", float((theirs or ours or (0.0,) * 3)[2]), theirs, ours
 
@@ -91,20 +91,20 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
         # of one instant, what is repeated leaves before what is new, and a withdrawal before a proposal
         in_order = sorted(sent.values(), key=lambda m: (m.sent_s, m.attempt == 0, m.kind == "proposal"))
         carried = link.carry(Transit(), in_order, math.inf)
-        due = {(m.kind, m.number, m.attempt, 0): math.nan for m in carried.lost}
+        expected = {(m.kind, m.number, m.attempt, 0): math.nan for m in carried.lost}
         for at_s, _, copy, m in carried.arrived:
-            due[m.kind, m.number, m.attempt, copy] = at_s
+            expected[m.kind, m.number, m.attempt, copy] = at_s
         if len(rows) != len(recorded):
             yield "rows of messages", 0.0, len(rows), len(recorded)
         for kind, number, attempt in sent:
             before = (kind, number, attempt - 1) if attempt else (kind, number - (kind != "proposal"), 0)
             if -1 not in before and before not in sent:
                 yield f"what was sent before {kind} {number} (attempt {attempt})", 0.0, "nothing", list(before)
-        for key in {**recorded, **due}:
-            theirs, ours = recorded.get(key, math.nan), due.get(key, math.nan)
+        for key in {**recorded, **expected}:
+            theirs, ours = recorded.get(key, math.nan), expected.get(key, math.nan)
             if not (abs(ours - theirs) <= SAME_S or (math.isnan(theirs) and not ours <= ends)):
-                told, due_s = ("never" if math.isnan(at) else at for at in (theirs, ours))
-                yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, told, due_s
+                theirs_s, ours_s = ("never" if math.isnan(at) else at for at in (theirs, ours))
+                yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, theirs_s, ours_s
 
 
 def _heard(trace: Trace, scenario: Scenario) -> Wrong:
@@ -114,14 +114,14 @@ def _heard(trace: Trace, scenario: Scenario) -> Wrong:
         return
     n, h = len(trace.ugvs), scenario.control.period_s
     t_s, last = trace.sampled("t_s"), np.zeros((n, n))
-    due = np.empty((len(t_s), n, n))
+    expected = np.empty((len(t_s), n, n))
     for k, t in enumerate(t_s):
         if k >= late:
             last[~lost(channel.seed, links.loss, n, k - late)] = t - late * h
-        due[k] = last
+        expected[k] = last
     for i, j in permutations(range(n), 2):
         receiver, sender = trace.ugvs[i], trace.ugvs[j]
-        theirs, ours = trace.sampled(f"{receiver}.heard_{sender}_s"), due[:, i, j]
+        theirs, ours = trace.sampled(f"{receiver}.heard_{sender}_s"), expected[:, i, j]
         for k in np.flatnonzero(~(np.abs(theirs - ours) <= SAME_S))[:1]:
             yield f"last position of {sender} that {receiver} has", float(t_s[k]), float(theirs[k]), float(ours[k])
 
@@ -157,7 +157,7 @@ def _executed(trace: Trace, scenario: Scenario) -> Wrong:
     period_s, gated = scenario.gatekeeper.period_s, method_of(trace.meta["method"]).gated
     table = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s")
     listed = (trace.decisions[name].tolist() for name in ("robot", "t_s", "number", "decision"))
-    said = {
+    decided = {
         (ugv, round(t / period_s)): number if answer == "accept" else -1
         for ugv, t, number, answer in zip(*listed, strict=True)
     }
@@ -165,8 +165,8 @@ def _executed(trace: Trace, scenario: Scenario) -> Wrong:
         rows = table[table["receiver"] == ugv].sort_values("received_s")
         arrived = [*zip(rows["received_s"].tolist(), rows["about"].tolist(), rows["kind"].tolist(), strict=True)]
         for t, number in zip(trace.sampled("t_s").tolist(), trace.sampled(f"{ugv}.executing").tolist(), strict=True):
-            due = said.get((ugv, int((t + SAME_S) / period_s)), -1) if gated else number
+            last = decided.get((ugv, int((t + SAME_S) / period_s)), -1) if gated else number
             news = {(about, kind) for at_s, about, kind in arrived if at_s <= t + SAME_S}
-            over = number == -1 and any(about > due or (about, kind) == (due, "withdrawal") for about, kind in news)
-            if (number != due and not over) or (number >= 0 and (number, "proposal") not in news):
-                yield f"number of the proposal that {ugv} executes", t, number, due
+            over = number == -1 and any(about > last or (about, kind) == (last, "withdrawal") for about, kind in news)
+            if (number != last and not over) or (number >= 0 and (number, "proposal") not in news):
+                yield f"number of the proposal that {ugv} executes", t, number, last

@@ -129,11 +129,6 @@ def _execution_time(trace: Trace, robot: str) -> list[float]:
     return [float(trace.t[max(rows[0] - 1, 0)])] if len(rows) else []
 
 
-def _acceptance_lasts(trace: Trace, robot: str) -> list[float]:
-    """1 if the gatekeeper never refused after its first acceptance and the robot arrives; empty without acceptance."""
-    return [float(not _taken_back(trace, robot))] if _times(trace, robot, "accept") else []
-
-
 def _collision_position(trace: Trace, robot: str) -> list[float]:
     """Position [x, y] in m of the robot's first collision."""
     hits = events_of(trace, robot, "collision")
@@ -156,7 +151,10 @@ MEASURES: dict[str, Measure] = {
     "trigger_time": lambda trace, robot: _times(trace, robot, "trigger")[:1],
     # 1 if the robot arrives, triggered only at the threshold, and the gatekeeper accepted and never refused.
     "intervention_succeeds": lambda trace, robot: [float(not _shortcomings(trace, robot))],
-    "acceptance_lasts": _acceptance_lasts,
+    # 1 if the gatekeeper never refused after its first acceptance and the robot arrives; empty without acceptance.
+    "acceptance_lasts": lambda trace, robot: [
+        float(not _taken_back(trace, robot)) for _ in _times(trace, robot, "accept")[:1]
+    ],
     # Time at which the UAV sent the proposal that the gatekeeper first accepted, or first refused, s.
     "accepted_proposal_time": lambda trace, robot: _sent(trace, robot, "accept"),
     "refused_proposal_time": lambda trace, robot: _sent(trace, robot, "refuse"),

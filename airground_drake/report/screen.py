@@ -34,7 +34,7 @@ class Check(NamedTuple):
 
     question: str
     mark: str
-    told: str
+    answer: str
     section: str = ""
 
 
@@ -99,12 +99,12 @@ def _headline(rows: Sequence[Row]) -> list[Line]:
     main = sorted([row for row in rows if row.plain] or rows, key=lambda row: row.rank)
     collided = [row for row in rows if not row.plain and row.facts and row.facts.collided]
     rest = sorted((row for row in [*main, *collided] if row.clause != main[0].clause), key=lambda row: row.rank)
-    told = []
+    lines = []
     for row, among in ((main[0], main), *[(rest[-1], rest) for _ in rest[:1]]):
         mark, says = row.clause
         alike = [other for other in among if other.clause == row.clause]
-        told.append(Line(mark, f"{_who(alike)} ({', '.join(other.run for other in alike)}): {says}."))
-    return told
+        lines.append(Line(mark, f"{_who(alike)} ({', '.join(other.run for other in alike)}): {says}."))
+    return lines
 
 
 def _who(alike: Sequence[Row]) -> str:
@@ -147,7 +147,7 @@ def _safe(run: RunFacts, rule: rules.Rule) -> Cell:
             rule.mark, [rule.words, f"the check: {(judged.status if judged.id else 'not made').replace('_', ' ')}"]
         )
     as_declared = " (as declared)" if judged.status == "refuted" and judged.as_expected is True else ""
-    lines = [rule.words + as_declared, *(breach.told for breach in run.breaches[:1])]
+    lines = [rule.words + as_declared, *(breach.line for breach in run.breaches[:1])]
     if run.collided and len(run.breaches) > 1:
         lines.append(counted(len(run.breaches) - 1, "more collision"))
     if run.others_too_close:
@@ -166,10 +166,10 @@ def _what(run: RunFacts) -> str:
     few, many = ("collide", "collisions") if run.collided else ("too close", "pairs too close")
     if not (run.collided or run.is_broken):
         return "safety not known"
-    told = f"{len(run.breaches) or 'some'} {many}"
+    breaches = f"{len(run.breaches) or 'some'} {many}"
     if len(run.breaches) == 1:
-        told = f"{run.breaches[0].first} and {run.breaches[0].second} {few}"
-    return f"{told} ({run.whose})" if run.whose else told
+        breaches = f"{run.breaches[0].first} and {run.breaches[0].second} {few}"
+    return f"{breaches} ({run.whose})" if run.whose else breaches
 
 
 def _arrived(run: RunFacts) -> Cell:
@@ -179,16 +179,16 @@ def _arrived(run: RunFacts) -> Cell:
         last = max((run.arrived_s.get(ugv, 0.0) for ugv in run.ugvs), default=0.0)
         astray = [uav for uav in run.uavs if uav not in run.home]
         who = "the UAV" if astray == run.uavs and len(astray) == 1 else some(astray, MOST_NAMES)
-        told = [f"{who} did not"] if astray else []
-        return Cell("partly" if astray else "yes", [f"{count}, by {last:.1f} s", *told])
+        others = [f"{who} did not"] if astray else []
+        return Cell("partly" if astray else "yes", [f"{count}, by {last:.1f} s", *others])
     goal = run.claim(rules.ARRIVAL)
     as_declared = " (as declared)" if goal.as_expected is True else ""
     ends = [*grouped((run.ending(ugv), ugv) for ugv in away).items()]
-    told = [f"{some(who, MOST_NAMES)} {how}" for how, who in ends]
+    endings = [f"{some(who, MOST_NAMES)} {how}" for how, who in ends]
     rest = sum(len(who) for _, who in ends[MOST_ENDINGS:])
     more = [counted(rest, "more UGV")] if rest else []
     return Cell(
-        "partly" if run.there or run.ends_too_early else "no", [count + as_declared, *told[:MOST_ENDINGS], *more]
+        "partly" if run.there or run.ends_too_early else "no", [count + as_declared, *endings[:MOST_ENDINGS], *more]
     )
 
 
@@ -216,11 +216,11 @@ def _seeds(report: Report) -> Iterator[Check]:
     of_runs = grouped((seed.run, seed) for seed in report.seeds)
     ours = scenario.decision.noise_m_sqrt_s
     noise = [run.set.get("decision.noise_m_sqrt_s", ours) for run in scenario.runs.values()]
-    told = grouped(
+    by_outcome = grouped(
         ((sum(seed.kept for seed in those), sum(seed.home for seed in those), len(those)), run)
         for run, those in of_runs.items()
     )
-    for (kept, home, count), names in told.items():
+    for (kept, home, count), names in by_outcome.items():
         mark = "no" if kept < count else "partly" if home < count else "yes"
         says = f"{', '.join(names)}: distances kept in {kept} of {count}, all home in {home}"
         yield Check("Other seeds?", mark, says)
@@ -235,12 +235,12 @@ def _zeno(report: Report) -> Iterator[Check]:
     """A line for each bound on the gaps between triggers, with the runs that have it."""
     bounds = report.about(rules.DWELL)
     own = {bound.run for bound in bounds}
-    told = grouped(
+    by_bound = grouped(
         ((bound.status, bound.inputs.get("dwell_s", 0.0)), name)
         for bound in bounds
         for name in ([bound.run] if bound.run else [name for name in report.runs if name not in own])
     )
-    for (status, dwell_s), names in told.items():
+    for (status, dwell_s), names in by_bound.items():
         traces = [claim for claim in report.about(rules.TRIGGER_GAPS) if claim.run in names]
         gaps = [claim.evidence["smallest_gap"]["gap_s"] for claim in traces if "smallest_gap" in claim.evidence]
         short = dwell_s < report.scenario.resolved.control.period_s
@@ -255,8 +255,8 @@ def _zeno(report: Report) -> Iterator[Check]:
             says += f"; least gap {min(gaps):.3g} s"
         elif _verdict(traces) == "yes":
             says += "; no robot triggered twice"
-        yield Check("Zeno-free?", mark, f"{', '.join(names)}: {says}" if len(told) > 1 else says, "claims")
-    if not told:
+        yield Check("Zeno-free?", mark, f"{', '.join(names)}: {says}" if len(by_bound) > 1 else says, "claims")
+    if not by_bound:
         yield Check("Zeno-free?", "open", "not checked", "claims")
 
 
@@ -302,12 +302,12 @@ def _verdict(those: Iterable[Claim]) -> str:
 def _paper(report: Report) -> Iterator[Check]:
     count = Counter[str](row.status for row in report.reproduction)
     match = sum(count[status] for status in rules.MATCHES)
-    told = [f"{count[status]} {says}" for status, says in {**rules.MATCHES, **rules.REST}.items() if count[status]]
+    counts = [f"{count[status]} {says}" for status, says in {**rules.MATCHES, **rules.REST}.items() if count[status]]
     if not count:
         yield Check("Paper reproduced?", "none", "not a scenario of the paper")
         return
     mark = "yes" if count["reproduced"] == count.total() else "partly" if match else "no"
-    says = f"{match} of {count.total()} numbers match: {', '.join(told)}"
+    says = f"{match} of {count.total()} numbers match: {', '.join(counts)}"
     yield Check("Paper reproduced?", mark, says, "reproduction")
 
 
@@ -323,8 +323,8 @@ def _beware(report: Report, rows: Sequence[Row]) -> list[str]:
         f"robots can keep away from {some(movers, MOST_NAMES)}: obstacles may move arbitrarily close": bool(movers),
         f"distances are kept in other runs of {', '.join(seen)}: this is not proved": bool(seen),
     }
-    told = [says for says, applies in warnings.items() if applies]
-    return [*told[: MOST_WARNINGS - 1], _real(report)]
+    applying = [says for says, applies in warnings.items() if applies]
+    return [*applying[: MOST_WARNINGS - 1], _real(report)]
 
 
 def _real(report: Report) -> str:
@@ -349,22 +349,22 @@ def declared(report: Report) -> Cell:
     """Whether the verdicts are as the scenario declares, which says nothing about safety."""
     overall = report.overall
     refuted = sum(claim.status == "refuted" and claim.as_expected is True for claim in report.claims)
-    told = [f"{overall.as_expected} of {counted(overall.checks, 'check')} are as the scenario declares"]
+    lines = [f"{overall.as_expected} of {counted(overall.checks, 'check')} are as the scenario declares"]
     if refuted:
-        told[0] += f" ({counted(refuted, 'failure')} among them)"
+        lines[0] += f" ({counted(refuted, 'failure')} among them)"
     wrong = [*overall.differs, *overall.undecided, *overall.missing]
     subjects = {claim.id: claim.subject for claim in report.claims}
     names = [f"{claim.run or 'model'}: {subjects.get(claim.id) or claim.id or 'run'} "
              f"{rules.CAME_OUT.get(claim.status, claim.status)}" for claim in wrong]  # fmt: skip
     names += [f"finding {number} about the paper not demonstrated" for number in overall.undemonstrated]
     if names:
-        told.append(", ".join(names[:3]))
+        lines.append(", ".join(names[:3]))
     if len(names) > 3:
-        told[-1] += f" and {len(names) - 3} more"
+        lines[-1] += f" and {len(names) - 3} more"
     if more := len(overall.unpromised):
-        told.append(f"{counted(more, 'more check')}: nothing is promised")
+        lines.append(f"{counted(more, 'more check')}: nothing is promised")
     mark = {"as_expected": "yes", "not_as_expected": "no"}.get(overall.status, "open")
-    return Cell(mark, told)
+    return Cell(mark, lines)
 
 
 WIDTH = 100  # characters of a line
@@ -375,12 +375,12 @@ COLUMNS, ANSWERS = (20, 29, 23, 22), (18, 80)
 def text(report: Report) -> str:
     screen = first_screen(report)
     lines = []
-    for mark, told in screen.headline:
-        lines += wrap(one_line(f"[{MARKS[mark].icon}] {told}"), WIDTH, subsequent_indent="    ")
+    for mark, clause in screen.headline:
+        lines += wrap(one_line(f"[{MARKS[mark].icon}] {clause}"), WIDTH, subsequent_indent="    ")
     titles = ("Run", "Safe? (nearest approach)", f"Arrived? ({screen.within})", "UAV proposals")
     runs = [[Cell("", [title]) for title in titles]]
     runs += [[Cell("", [f"{row.run}: {row.says}"]), row.safe, row.arrived, row.uav] for row in screen.rows]
-    below = [(check.question, Cell(check.mark, [check.told])) for check in screen.checks]
+    below = [(check.question, Cell(check.mark, [check.answer])) for check in screen.checks]
     below += [("Do not conclude", Cell("", [f"that {warning}" for warning in screen.beware]))]
     below += [("As declared?", screen.declared)]
     asked = [question for question, _ in below]
@@ -391,13 +391,13 @@ def text(report: Report) -> str:
 
 def _table(rows: Sequence[Sequence[Cell]], widths: Sequence[int]) -> list[str]:
     """Rows of text with columns of these widths; wrapped lines are indented past the mark."""
-    told = []
+    lines = []
     for row in rows:
         cells = [_wrapped(cell, width) for cell, width in zip(row, widths, strict=True)]
         for k in range(max(map(len, cells))):
             parts = ((cell[k] if k < len(cell) else "").ljust(width) for cell, width in zip(cells, widths, strict=True))
-            told.append("  ".join(parts).rstrip())
-    return told
+            lines.append("  ".join(parts).rstrip())
+    return lines
 
 
 def _wrapped(cell: Cell, width: int) -> list[str]:

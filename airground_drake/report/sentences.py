@@ -87,15 +87,15 @@ def number(x: Any, digits: int = 4) -> str:
     return f"{x:.{digits}g}".replace("-", "\N{MINUS SIGN}")
 
 
-def told(x: Any, unit: str = "", digits: int = 4) -> str:
+def as_text(x: Any, unit: str = "", digits: int = 4) -> str:
     """A value in a line: numbers and vectors with their units, those of a record with their names."""
     if isinstance(x, Mapping):
         parts = ((split(str(key)), item) for key, item in x.items())
-        return "; ".join(f"{name} {told(item, own or unit, digits)}" for (name, own), item in parts) or "none"
+        return "; ".join(f"{name} {as_text(item, own or unit, digits)}" for (name, own), item in parts) or "none"
     if isinstance(x, list | tuple):
         if x and all(isinstance(item, int | float) for item in x):
             return f"({', '.join(number(item, digits) for item in x)}) {unit}".rstrip()
-        return ", ".join(told(item, unit, digits) for item in x) or "none"
+        return ", ".join(as_text(item, unit, digits) for item in x) or "none"
     if isinstance(x, bool) or (unit == YES_NO and x is not None):
         return "yes" if x else "no"
     return f"{number(x, digits)} {unit}".rstrip() if isinstance(x, int | float) else number(x)

@@ -183,7 +183,6 @@ def _composed(text: str, source: str) -> yaml.Node:
 
 
 def of_data(data: Any, source: str) -> Document:
-    """A document of nested dicts and lists made in Python."""
     try:
         return Document(simple(data), source, {})
     except RecursionError:
@@ -238,7 +237,6 @@ def _inside(data: Any, name: str) -> Any:
 
 
 def put(document: Document, at: tuple[str, ...], new: Any, source: str) -> None:
-    """Change a document: put another value at a place."""
     data = document.data
     for place in [written for written in document.places if written[: len(at)] == at]:
         del document.places[place]

@@ -92,7 +92,6 @@ class Estimate(NamedTuple):
 
 
 def estimate(scenario: Scenario) -> Estimate:
-    """The work that all runs of a validated scenario ask for."""
     from airground_drake.scenario.load import own
 
     of_runs = [_of_run(own(scenario, name), run) for name, run in scenario.runs.items()]

@@ -12,7 +12,6 @@ from airground_drake.scenario.recorded import adapter
 
 
 def filled(kind: type, document: Document) -> Any:
-    """A dataclass with the data of a document, checked by pydantic."""
     try:
         return adapter(kind).validate_python(document.data)
     except ValidationError as error:

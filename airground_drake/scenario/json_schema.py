@@ -34,7 +34,6 @@ _NAMES = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN, "maxLength": MAX
 
 
 def text(*, installed: bool = True) -> str:
-    """`scenario_schema` as a file."""
     return json.dumps(scenario_schema(installed=installed), indent=1) + "\n"
 
 

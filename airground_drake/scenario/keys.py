@@ -95,14 +95,10 @@ def _kind(says: dict[str, Any]) -> str:
     if says.keys() & {"$ref", "oneOf"}:
         return "a mapping, see below"
     if says["type"] == "array":
-        return "a point, [x, y, z]" if says.get("maxItems") == 3 else f"a list of {_several(_kind(says['items']))}"
+        plural = re.sub(r"^(?:a |)((?:whole )?\w+)", r"\1s", _kind(says["items"]))
+        return "a point, [x, y, z]" if says.get("maxItems") == 3 else f"a list of {plural}"
     if says["type"] == "object":
         return "a mapping by name"
     return {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "text"}[
         says["type"]
     ]
-
-
-def _several(kind: str) -> str:
-    """The plural of what `_kind` says."""
-    return re.sub(r"^(?:a |)((?:whole )?\w+)", r"\1s", kind)

@@ -75,7 +75,6 @@ class OneOrList:
         )
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The list or one of its entries."""
         several = handler(schema)
         return {"anyOf": [several["items"], several]}
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from airground_drake.base.errors import Fault, ScenarioError, short
 from airground_drake.base.exact import decimal
@@ -100,7 +100,7 @@ def resolved(scenario: Scenario) -> dict[str, Any]:
 
 def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -> Scenario:
     """The scenario of a document with overrides, checked; only with some runs, if it has them."""
-    chosen = _choices(document)
+    before = deepcopy(document.data) if _choices(document.data) else None
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
             _put(document, str(key), value)
@@ -110,7 +110,7 @@ def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -
     given = document.data.get("runs") if runs and isinstance(document.data, dict) else None
     if isinstance(given, dict) and {*runs} <= given.keys():
         document.data["runs"] = {name: given[name] for name in runs}
-    _mark_set(document, chosen)
+    _mark_set(document, before)
     scenario = _checked(document)
     for name, run in scenario.runs.items():
         if run.set:
@@ -118,36 +118,25 @@ def _build(document: Document, overrides: Overrides, runs: Sequence[str] = ()) -
     return scenario
 
 
-class Chosen(NamedTuple):
-    """An entry of `choices`, a copy of it, and the values that its key leads through, to the one that it is about."""
-
-    entry: dict[str, Any]
-    copy: dict[str, Any]
-    way: list[Any]
+def _choices(data: Any) -> list[dict[str, Any]]:
+    """The entries of `choices` in unchecked data."""
+    listed = data.get("choices") if isinstance(data, dict) else None
+    return [entry for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
 
 
-def _choices(document: Document) -> list[Chosen]:
-    listed = document.data.get("choices") if isinstance(document.data, dict) else None
-    entries = [entry for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
-    ways = [way(document.data, str(entry.get("key"))) for entry in entries]
-    return [
-        Chosen(entry, dict(entry), [*passed[:-1], *deepcopy(passed[-1:])])
-        for entry, passed in zip(entries, ways, strict=True)
-    ]
-
-
-def _mark_set(document: Document, before: Sequence[Chosen]) -> None:
+def _mark_set(document: Document, before: Any) -> None:
     """Replace the reasons for values that overrides have changed, and drop choices about what they have removed."""
-    for old, now in zip(before, _choices(document), strict=False):
-        if now.entry is not old.entry or now.entry != old.copy:
+    for was, choice in zip(_choices(before), _choices(document.data), strict=False):
+        if choice != was:  # set by an override itself
             continue
-        depth = len(place_of(str(now.entry.get("key"))))
-        if len(now.way) < len(old.way):
-            document.data["choices"].remove(now.entry)
-        elif len(now.way) == depth and (len(old.way) < depth or old.way[-1] != now.way[-1]):
-            had = old.way[-1] if len(old.way) == depth else None
-            told = f"; the file has {json.dumps(had)}" if isinstance(had, int | float | str) else ""
-            now.entry.update(source=SET, reason=f"set by an override{told}")
+        key = str(choice.get("key"))
+        old, new, depth = way(before, key), way(document.data, key), len(place_of(key))
+        if len(new) < len(old):
+            document.data["choices"].remove(choice)
+        elif len(new) == depth and (len(old) < depth or old[-1] != new[-1]):
+            value = old[-1] if len(old) == depth else None
+            in_the_file = f"; the file has {json.dumps(value)}" if isinstance(value, int | float | str) else ""
+            choice.update(source=SET, reason=f"set by an override{in_the_file}")
 
 
 def own(scenario: Scenario, run: str) -> Scenario:

@@ -85,7 +85,6 @@ def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
 
 
 def cells(given: Map, folder: Path, starts: Sequence[Sequence[float]], where: str, *, copied: bool = False) -> MapCells:
-    """The cells of a scenario's map, read from its files."""
     # starts: of all robots, [x, y, ...], m; what none of them can reach is filled.
     chart = read(folder / given.file, where, copied=copied)
     grid = chart.grid(unknown=given.unknown == "occupied")

@@ -250,7 +250,6 @@ class MapCells:
     They may overlap."""
 
     def __str__(self) -> str:
-        """One line for people."""
         cells = f"{self.columns} x {self.rows} cells of {self.cell_m:g} m"
         counts = f"{self.occupied} occupied, {self.unsure} unknown ({self.unknown}), {self.unreached} out of reach"
         return f"map {self.file}: {cells}, {counts}; {len(self.rectangles)} rectangles"

@@ -25,11 +25,10 @@ from airground_drake.model.plants.plant import Setting
 from airground_drake.model.trigger.bayes import threshold
 from airground_drake.scenario import hints
 from airground_drake.scenario.budget import PairBudget, budget, takes_room
-from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of, refusal
 from airground_drake.scenario.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenario.schema import ABOUT, ARENA, MAP, SHAPES, Obstacle, Scenario, Vector
-from airground_drake.scenario.shapes import crossing, near_edge
+from airground_drake.scenario.shapes import crossing, near_edge, outlines_of
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 TOLERANCE = 1e-9  # m between points; relative between periods
@@ -123,21 +122,21 @@ def _asynchronous(scenario: Scenario) -> Problems:
     """The asynchronous law needs discs with exact motion, exact positions, and methods with avoidance on top."""
     if not scenario.asynchronous:
         return
-    told = "with control.law: asynchronous"
+    law = "with control.law: asynchronous"
     if scenario.ugv_links is None:
         allowed = "shared, or with a channel.ugvs, such as {}: without it UGVs know all positions at once"
         yield "control.law", "asynchronous", allowed
     if scenario.sensing is not None:
-        yield "sensing", Fault(told), "left out: no theorem is about old positions with errors"
+        yield "sensing", Fault(law), "left out: no theorem is about old positions with errors"
     for run, spec in scenario.runs.items():
         if METHODS[spec.method].intervention_on_top and METHODS[spec.method].intervenes:
-            yield f"runs.{run}.method", spec.method, f"a or d {told}: {spec.method} puts interventions above avoidance"
+            yield f"runs.{run}.method", spec.method, f"a or d {law}: {spec.method} puts interventions above avoidance"
         if spec.composition != "augmented":
-            yield f"runs.{run}.composition", spec.composition, f"augmented {told}: UGVs may have to stand still"
+            yield f"runs.{run}.composition", spec.composition, f"augmented {law}: UGVs may have to stand still"
     for name, ugv in scenario.ugvs.items():
         plant = plant_of(ugv, scenario.control.period_s)
         if plant.signals or plant.measured:
-            why = f"first_order {told}: no theorem is about old positions of other plants"
+            why = f"first_order {law}: no theorem is about old positions of other plants"
             yield f"ugvs.{name}.plant", Fault(ugv.plant[0].kind), why
     for (one, first), (other, second) in combinations(scenario.ugvs.items(), 2):
         keeps = scenario.unsure_s * max(first.max_speed_m_s, second.max_speed_m_s) + scenario.safe_distance.ugv_m
@@ -513,10 +512,10 @@ def _filled(scenario: Scenario) -> str:
     cells = scenario.map.cells if scenario.map else None
     if cells is None:
         return ""
-    told = [f"{cells.unsure} unknown ones"] if cells.unsure and cells.unknown == "occupied" else []
+    counted = [f"{cells.unsure} unknown ones"] if cells.unsure and cells.unknown == "occupied" else []
     if cells.unreached:
-        told.append(f"{cells.unreached} free ones that cannot be reached from any start")
-    return f" (of whose cells {' and '.join(told)} count as occupied)" if told else ""
+        counted.append(f"{cells.unreached} free ones that cannot be reached from any start")
+    return f" (of whose cells {' and '.join(counted)} count as occupied)" if counted else ""
 
 
 def _clearances(scenario: Scenario) -> Problems:

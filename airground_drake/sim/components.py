@@ -19,10 +19,10 @@ from airground_drake.model.trigger.automaton import Trigger
 from airground_drake.model.trigger.bayes import threshold
 from airground_drake.scenario.budget import budget, takes_room
 from airground_drake.scenario.courses import course
-from airground_drake.scenario.links import make_qualities
-from airground_drake.scenario.outlines import outlines_of
+from airground_drake.scenario.links import make_links
 from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import Decision, Scenario, Uav
+from airground_drake.scenario.shapes import outlines_of
 from airground_drake.scenario.world import make_world
 from airground_drake.uav.database import BehaviourDatabase, make_policy
 from airground_drake.uav.planner import Mover, Planner, Sender
@@ -56,7 +56,7 @@ def repeats_after(scenario: Scenario) -> float:
     """Time after which an unanswered message is repeated, s; infinite without a channel."""
     if scenario.channel is None:
         return np.inf
-    down, up = make_qualities(scenario.channel)
+    down, up = (link.quality for link in make_links(scenario.channel))
     # so an answer in time is read a planning period before: then the planner asks whether a copy would come too late
     samples = scenario.gatekeeper.period_s, scenario.control.period_s, scenario.intervention.period_s
     answering = max(ANSWERING_S, sum(samples))
@@ -143,7 +143,6 @@ def make_movers(scenario: Scenario) -> tuple[Mover, ...]:
 
 
 def make_route(scenario: Scenario) -> Route:
-    """The solver route of the gatekeeper's problem (26)."""
     gate = scenario.gatekeeper
     chosen: dict[str, Any] = {"blocks": gate.blocks} if gate.blocks else {}
     if gate.solver != "daqp":
@@ -178,13 +177,11 @@ def make_rules(scenario: Scenario) -> Rules:
 
 
 def make_outlook(scenario: Scenario) -> Outlook:
-    """The horizon of predicted outcomes."""
     gate = scenario.gatekeeper
     return Outlook(gate.longest_s, gate.settling_s, gate.horizon_s, scenario.arrival_tolerance_m)
 
 
 def make_patience(scenario: Scenario) -> Patience:
-    """The limits of how often and how long UGVs follow the UAV."""
     gate = scenario.gatekeeper
     return Patience(gate.tries, gate.rest_s, gate.longest_s)
 

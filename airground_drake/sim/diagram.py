@@ -314,17 +314,15 @@ def _vehicles(world: World, plants: Mapping[str, System], *, disturbed: bool) ->
     velocities = builder.AddNamedSystem("team_velocity", Demultiplexer(sum(sizes), 3))
     for body, plant in plants.items():
         builder.AddNamedSystem(f"{body}_plant", plant)
-    bodies = builder.AddNamedSystem("bodies", Multiplexer([3] * len(plants)))
-    for i, plant in enumerate(plants.values()):
-        builder.Connect(plant.get_output_port(0), bodies.get_input_port(i))
-        if i < len(world.robots):
-            builder.Connect(velocities.get_output_port(i), plant.get_input_port(0))
+    bodies = together(builder, "bodies", [plant.get_output_port(0) for plant in plants.values()])
+    for i, robot in enumerate(world.robots):
+        builder.Connect(velocities.get_output_port(i), plants[robot].get_input_port(0))
     builder.Connect(commanded, velocities.get_input_port())
     for i, kind in enumerate(ROBOTS):
         builder.ExportInput(team_command.get_input_port(i), f"{kind}_command")
     for robot in world.robots if disturbed else ():
         builder.ExportInput(disturbance.GetInputPort(f"disturbance_{robot}"), f"disturbance_{robot}")
-    builder.ExportOutput(bodies.get_output_port(), "bodies")
+    builder.ExportOutput(bodies, "bodies")
     builder.ExportOutput(team_command.get_output_port(), "team_command")
     signals = [port for plant in plants.values() for port in outputs_of(plant) if port.get_name() == "signals"]
     if signals:
@@ -405,14 +403,14 @@ def make_monitor(
     """
     scenario = validated(scenario)
     if scenario.ugv_controller is not None:
-        told = f"ugv_controller {scenario.ugv_controller.kind!r} has no law that is known here"
-        raise PluginError(f"{told}; allowed for a monitor: a scenario without one")
+        cause = f"ugv_controller {scenario.ugv_controller.kind!r} has no law that is known here"
+        raise PluginError(f"{cause}; allowed for a monitor: a scenario without one")
     if scenario.sensing is not None:
-        told = f"sensing of scenario {scenario.name!r} has errors, and a monitor sees true positions"
-        raise PluginError(f"{told}; allowed: a scenario without sensing")
+        cause = f"sensing of scenario {scenario.name!r} has errors, and a monitor sees true positions"
+        raise PluginError(f"{cause}; allowed: a scenario without sensing")
     if scenario.ugv_links is not None:
-        told = f"channel.ugvs of scenario {scenario.name!r} says what UGVs know, and a monitor sees true positions"
-        raise PluginError(f"{told}; allowed: a scenario without it")
+        cause = f"channel.ugvs of scenario {scenario.name!r} says what UGVs know, and a monitor sees true positions"
+        raise PluginError(f"{cause}; allowed: a scenario without it")
     chosen, composition = _chosen(scenario, method, composition)
     world = make_world(scenario)
     ugvs = UgvController(world, components.make_law(scenario, chosen, composition))

@@ -120,7 +120,9 @@ def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> In
     """Rows, (K,), at or after which a centre comes within a distance of a shape."""
     # apart: (T - 1, 3), m; shape: (k, W); within: m
     places = np.concatenate([apart.start, apart.end[-1:]])
-    if len(shape) <= FEW and not any(_may_be_within(places, row, within + apart.off_m, planar) for row in shape):
+    reaches = within + apart.off_m + shape[:, outline.RADIUS] + ROUNDING_M
+    comes_near = (least_apart(row, places, planar) < reach for row, reach in zip(shape, reaches, strict=True))
+    if len(shape) <= FEW and not any(comes_near):
         return np.empty(0, dtype=np.intp)
     near, passes = np.zeros(len(places), dtype=bool), np.zeros(len(apart.start), dtype=bool)
     longest = float(np.linalg.norm(apart.end - apart.start, axis=1).max())
@@ -136,7 +138,3 @@ def visits(apart: PeriodMotion, shape: Array, within: float, planar: bool) -> In
         passes[some] |= least < reach + apart.off_m
     enters = near & ~np.append(False, near[:-1])
     return np.flatnonzero(enters | np.append(passes & ~near[:-1] & ~near[1:], False))
-
-
-def _may_be_within(places: Array, row: Array, within: float, planar: bool) -> bool:
-    return bool(least_apart(row, places, planar) < within + row[outline.RADIUS] + ROUNDING_M)

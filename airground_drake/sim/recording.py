@@ -190,7 +190,6 @@ _BLANK: dict[str, Any] = {name: "" if kind == "str" else -1.0 for name, kind in 
 
 
 def _decision(decision: GatekeeperDecision, robot: str, route: str) -> dict[str, Any]:
-    """A row of `Trace.decisions`."""
     rested_on = decision.basis
     row: dict[str, Any] = _BLANK | {
         "t_s": decision.t,
@@ -240,7 +239,6 @@ def _word(accepts: bool) -> str:
 
 
 def problems(decided: Sequence[GatekeeperDecision]) -> pd.DataFrame:
-    """`Trace.problems` of the decisions."""
 
     def flat(array: Array | None) -> list[float]:
         return [] if array is None else array.ravel().tolist()
@@ -265,7 +263,6 @@ def _sent(memories: Iterable[PlannerState]) -> list[tuple[int, Proposal]]:
 
 
 def proposals(ugvs: Sequence[str], memories: Iterable[PlannerState]) -> pd.DataFrame:
-    """`Trace.proposals` from the planners' memories."""
     rows = [
         (
             proposal.number, ugvs[i], proposal.policy, float(proposal.issued), proposal.motion.times.tolist(),
@@ -280,7 +277,6 @@ def proposals(ugvs: Sequence[str], memories: Iterable[PlannerState]) -> pd.DataF
 
 
 def plans(memories: Mapping[str, PlannerState], ugvs: Sequence[str]) -> pd.DataFrame:
-    """`Trace.plans` from the planners' memories."""
     numbers = {(proposal.issued, ugvs[i]): proposal.number for i, proposal in _sent(memories.values())}
     rows = [
         {
@@ -337,8 +333,8 @@ def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[s
     withdrawn = sorted((gone for memory in memories for gone in memory.withdrawn), key=lambda gone: gone[1])
     for count, (number, t) in enumerate(withdrawn):
         yield row("withdrawal", count, number, t, t)
-    told = trace.decisions[trace.decisions["answer"] >= 0]
-    for t, answer, number in zip(*(told[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
+    answers = trace.decisions[trace.decisions["answer"] >= 0]
+    for t, answer, number in zip(*(answers[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
         yield row("answer", answer, number, t, read.get(answer, never))
 
 
@@ -379,11 +375,11 @@ def _row(
 
 def faults(memories: Mapping[str, PlannerState]) -> list[dict[str, Any]]:
     """Entries of `Trace.meta["faults"]`; the first fault of each policy has a traceback, if it is known."""
-    told, entries = set[str](), []
+    shown, entries = set[str](), []
     for fault in (asking for _, asking in _asked(memories) if asking.what):
         entry = {"t_s": fault.t, "robot": fault.robot, "policy": fault.policy, "what": fault.what}
-        if fault.traceback and fault.policy not in told:
+        if fault.traceback and fault.policy not in shown:
             entry["traceback"] = fault.traceback
-            told.add(fault.policy)
+            shown.add(fault.policy)
         entries.append(entry)
     return entries

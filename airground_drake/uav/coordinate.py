@@ -78,7 +78,6 @@ class Coordinate(Policy):
     def __init__(
         self, *, speed_m_s: float = math.inf, clearance_m: float = 0.1, spacing_m: float = 0.2, follow_s: float = 8.0
     ) -> None:
-        """Set the parameters; all have defaults."""
         if not (speed_m_s > 0.0 and clearance_m > 0.0 and spacing_m > 0.0 and follow_s >= 0.0):
             raise ValueError(
                 f"coordinate needs speed_m_s, clearance_m, spacing_m > 0 and follow_s >= 0, "

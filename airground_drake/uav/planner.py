@@ -163,10 +163,6 @@ class Planner:
             indices.setdefault(outline.as_tuple(row), []).append(k)
         return indices
 
-    def _is_on_map(self, given: Outline, there: npt.NDArray[np.bool_]) -> bool:
-        """Whether each outline is on the map and exists now, (m,)."""
-        return any(there[k] for k in self._rows.get(given, ()))
-
     def start(self) -> PlannerState:
         return PlannerState((Negotiation(),) * len(self.ugvs))
 
@@ -226,7 +222,8 @@ class Planner:
         fresh: tuple[Outline, ...] = ()
         if unknown:
             there = self._there(now.t)
-            fresh = tuple(sorted((row for row in unknown if not self._is_on_map(row, there)), key=_place))
+            unmapped = [row for row in unknown if not any(there[k] for k in self._rows.get(row, ()))]
+            fresh = tuple(sorted(unmapped, key=_place))
         talks = self._after_answers(memory.talks, now, said, learnt=bool(fresh))
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen} | {

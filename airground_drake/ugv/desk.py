@@ -32,7 +32,6 @@ class Desk(Immutable):
 
     @classmethod
     def empty(cls, count: int) -> Desk:
-        """The initial state of `count` UGVs."""
         return cls((None,) * count, (-1,) * count, (None,) * count)
 
 
@@ -53,7 +52,7 @@ def read(desk: Desk, arrived: Sequence[Delivery], t: float) -> Desk:
 
 
 def replied(
-    desk: Desk, asked: Collection[int], answers: Sequence[float], reports: Reports, told: int, t: float, retry_s: float
+    desk: Desk, asked: Collection[int], answers: Sequence[float], reports: Reports, sent: int, t: float, retry_s: float
 ) -> tuple[Desk, int]:
     """The state after answering at time t, s, and the number of answers so far."""
     # asked: UGVs that have read a message at this sample. A report with a new number is a new answer to what is held.
@@ -65,7 +64,7 @@ def replied(
         if held is not None and report.number > (-1 if before is None else before.number):
             message = Message("answer", report.number, held.number, i, t, 0, content)
         elif (content.newest, content.holds) != (was.newest, was.holds):
-            message, told = Message("answer", told, newest, i, t, 0, content), told + 1
+            message, sent = Message("answer", sent, newest, i, t, 0, content), sent + 1
         elif before is not None and (i in asked or _repeats(before, verdict, t, retry_s)):
             message = before._replace(sent_s=t, attempt=before.attempt + 1)
         else:
@@ -73,8 +72,8 @@ def replied(
         last[i] = message
         new.append(message)
     if not new:
-        return desk, told
-    return replace(desk, last=tuple(last), outbox=desk.outbox.plus(new)), told
+        return desk, sent
+    return replace(desk, last=tuple(last), outbox=desk.outbox.plus(new)), sent
 
 
 @dataclass(frozen=True)
@@ -83,25 +82,24 @@ class Obeying(Immutable):
 
     desk: Desk
     reports: Reports
-    told: int = 0  # answers sent so far
+    sent: int = 0  # answers sent so far
 
     @classmethod
     def empty(cls, count: int) -> Obeying:
-        """The initial state of `count` UGVs."""
         return cls(Desk.empty(count), (Report(),) * count)
 
     def after(self, arrived: Sequence[Delivery]) -> Obeying:
         """The state after reading each arrived message at its time."""
         now, first = self, len(self.desk.read_s)
         for k, delivery in enumerate(arrived[first:], first + 1):
-            i, t, told, reports = delivery.message.ugv, delivery.received_s, now.told, list(now.reports)
+            i, t, sent, reports = delivery.message.ugv, delivery.received_s, now.sent, list(now.reports)
             desk = read(now.desk, arrived[:k], t)
             if desk.held[i] is not now.desk.held[i]:
-                reports[i] = Report() if desk.held[i] is None else Report(told)
-                told += desk.held[i] is not None
+                reports[i] = Report() if desk.held[i] is None else Report(sent)
+                sent += desk.held[i] is not None
             answers = [number for answer in obeyed(desk.held) for number in answer]
-            desk, told = replied(desk, {i}, answers, tuple(reports), told, t, math.inf)
-            now = Obeying(desk, tuple(reports), told)
+            desk, sent = replied(desk, {i}, answers, tuple(reports), sent, t, math.inf)
+            now = Obeying(desk, tuple(reports), sent)
         return now
 
 

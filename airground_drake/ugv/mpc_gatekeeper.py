@@ -48,7 +48,7 @@ class GatekeeperState(Immutable):
     answers: tuple[float, ...]  # in force, (2n,), see `messages`
     since: tuple[float, ...]  # time of each UGV's last change of answer, (n,), s
     reports: Reports  # each UGV's last message to the UAV about its proposal
-    told: int = 0  # answers sent so far
+    sent: int = 0  # answers sent so far
     desk: Desk | None = None  # messages read and answered over a channel
     decisions: tuple[GatekeeperDecision, ...] = ()  # those of the last sample with proposals, or of its repetition
     commitments: tuple[Commitment, ...] = ()  # under method (d), each UGV's tries and rests
@@ -61,7 +61,6 @@ class GatekeeperState(Immutable):
 
     @classmethod
     def empty(cls, count: int, *, channel: bool = False) -> GatekeeperState:
-        """The initial memory of `count` UGVs."""
         held = (Commitment(),) * count
         desk = Desk.empty(count) if channel else None
         return cls((SILENT, -1.0) * count, (0.0,) * count, (Report(),) * count, commitments=held, desk=desk)
@@ -154,19 +153,19 @@ class Gatekeepers(abc.ABC):
         self, now: Inputs, before: GatekeeperState, judged: Sequence[tuple[GatekeeperDecision, float]]
     ) -> GatekeeperState:
         """The state after the decisions of a sample, with the resulting answers."""
-        n, told = len(now.proposals), before.told
+        n, sent = len(now.proposals), before.sent
         answers, reports, decisions = [SILENT, -1.0] * n, [Report()] * n, list[GatekeeperDecision]()
         for decision, verdict in judged:
             i, number = decision.robot, decision.proposal.number
             news = self._news(now, before, decision, verdict)
             if news is not None:
-                decision, told = replace(decision, answer=told), told + 1
+                decision, sent = replace(decision, answer=sent), sent + 1
                 news = news._replace(number=decision.answer)
             reports[i] = news or before.reports[i]
             decisions.append(decision)
             answers[2 * i : 2 * i + 2] = verdict, number
         return replace(
-            before, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), told=told,
+            before, answers=tuple(answers), reports=tuple(reports), decisions=tuple(decisions), sent=sent,
             made=before.made.plus(decisions),
         )  # fmt: skip
 
@@ -174,11 +173,11 @@ class Gatekeepers(abc.ABC):
         self, now: Inputs, before: GatekeeperState, decision: GatekeeperDecision, verdict: float
     ) -> Report | None:
         """The report of a changed answer, or of obstacles that the UAV does not know; else None."""
-        i, told = decision.robot, before.reports[decision.robot]
+        i, reported = decision.robot, before.reports[decision.robot]
         near = self._near.still[self._in_range(decision.t, now.positions[i])]
         sensed, seen = tuple(map(outline.as_tuple, near)), self._seen(now, i)
-        if verdict == answer_to(decision.proposal, before.answers, i) and seen == told.seen:
-            new = [row for row, given in zip(near, sensed, strict=True) if given not in told.sensed]
+        if verdict == answer_to(decision.proposal, before.answers, i) and seen == reported.seen:
+            new = [row for row, given in zip(near, sensed, strict=True) if given not in reported.sensed]
             if not new or outline.is_among(np.array(new), decision.proposal.mapped).all():
                 return None
         return Report(-1, sensed, decision.reason, in_words(decision), seen)
@@ -226,11 +225,9 @@ class PaperGatekeepers(Gatekeepers):
 
     @property
     def judges(self) -> str:
-        """Name of the route's class."""
         return type(self._route).__name__
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
-        """Judge every proposal in force by (26)."""
         since: list[float] = []
         judged: list[tuple[GatekeeperDecision, float]] = []
         budgets = self._rules.budgets(sum(p is not None for p in now.proposals))

@@ -91,30 +91,30 @@ class OutcomeGatekeepers(Gatekeepers):
         for i, (proposal, report) in enumerate(zip(proposals, after.reports, strict=True)):
             rows = np.flatnonzero(quiet[i])
             if proposal is not None and len(rows):
-                told = np.array([outline.as_tuple(self._near.still[k]) in report.sensed for k in rows])
-                quiet[i, rows] = told | outline.is_among(self._near.still[rows], proposal.mapped)
+                reported = np.array([outline.as_tuple(self._near.still[k]) in report.sensed for k in rows])
+                quiet[i, rows] = reported | outline.is_among(self._near.still[rows], proposal.mapped)
         return quiet
 
     def sample(self, now: Inputs, before: GatekeeperState) -> GatekeeperState:
         """Judge every new proposal by its outcome; keep the other answers."""
         sensed = self._remembered(now.t, now.positions, before)
         known = replace(before, sensed=sensed)
-        said = [answer_to(proposal, before.answers, i) for i, proposal in enumerate(now.proposals)]
+        answers = [answer_to(proposal, before.answers, i) for i, proposal in enumerate(now.proposals)]
         held = list(before.commitments)
-        for i, standing in enumerate(said):
+        for i, standing in enumerate(answers):
             if held[i].executing and standing != ACCEPT:  # withdrawn
                 held[i] = self._patience.stop(held[i], now.t)
             held[i] = self._patience.rested(held[i], now.t)
         judged = [
-            self._decide(now, known, before, i, proposal, said[i], held[i])
+            self._decide(now, known, before, i, proposal, answers[i], held[i])
             for i, proposal in enumerate(now.proposals)
             if proposal is not None
         ]
         verdicts: list[tuple[GatekeeperDecision, float]] = []
         for decision in judged:
             i = decision.robot
-            held[i] = self._after(held[i], decision, said[i])
-            verdicts.append((replace(decision, tries=held[i].tries), _answer(decision, said[i])))
+            held[i] = self._after(held[i], decision, answers[i])
+            verdicts.append((replace(decision, tries=held[i].tries), _answer(decision, answers[i])))
         after = replace(self._answered(now, known, verdicts), commitments=tuple(held))
         return replace(after, quiet=self._quiet(now.proposals, after))
 
@@ -187,8 +187,8 @@ class OutcomeGatekeepers(Gatekeepers):
     def _view_of(self, now: Inputs, known: GatekeeperState, i: int, proposal: Proposal) -> tuple[View, Basis]:
         """A UGV's knowledge: sensed or reported obstacles, moving bodies, and other parts of the same joint plan."""
         around, m = self._view(now, i), len(self._near.still)
-        told = self._believed(now.positions[i], known.sensed[i], proposal)
-        still = outline.joined(self._near.still[known.sensed[i]], proposal.mapped[told])
+        believed = self._believed(now.positions[i], known.sensed[i], proposal)
+        still = outline.joined(self._near.still[known.sensed[i]], proposal.mapped[believed])
         asked: list[tuple[Motion, bool] | None] = []
         planned = dict(proposal.beside)
         for body in (self._world.moving[j] for j in self._near.carrier[self._beside(now, i)]):
@@ -198,7 +198,7 @@ class OutcomeGatekeepers(Gatekeepers):
                 asked.append((planned[body.name], False) if body.name in planned else None)
         sensed = np.flatnonzero(self._in_range(now.t, now.positions[i])).tolist()
         remembered = np.flatnonzero(known.sensed[i]).tolist()
-        basis = Basis(tuple(sensed), tuple(remembered), (), tuple(told.tolist()))
+        basis = Basis(tuple(sensed), tuple(remembered), (), tuple(believed.tolist()))
         seen = replace(
             around,
             still=still,

@@ -49,7 +49,6 @@ def cache_folder() -> Path:
 
 
 def key(claim: ModelClaim, inputs: Mapping[str, Any]) -> str:
-    """SHA-256 of all inputs of a finding."""
     return files.sha256(json.dumps(content(claim, inputs), sort_keys=True, allow_nan=False).encode())
 
 

@@ -212,7 +212,6 @@ class Verdict(Finding):
         return cls(**values, claim=claim, run=run, expected=expected, inputs=inputs or {})
 
     def __repr__(self) -> str:
-        """One line with claim, run and finding."""
         about = f"run {self.run!r}" if self.run else "the model"
         return f"<Verdict: {self.claim.id} on {about}: {outcome(self.status, self.exercised)}>"
 

@@ -44,7 +44,6 @@ class Chart:
     caption: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse lines and points that cannot be drawn."""
         for name, (x, y) in self.lines.items():
             if not len(x) == len(y) > 0:
                 raise ValueError(f"line {name!r} has {len(x)} numbers across and {len(y)} up; wanted: as many, not 0")

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.hostile_policies import KINDS
 from check.forgeries import (
     RULES,
     all_of,
@@ -59,7 +60,7 @@ from airground_drake.scenario.plugins import OPTION
 from airground_drake.sim.trace import load
 
 POLICIES = [
-    {"name": "check.foreign:Fails"},
+    {"name": "builders.hostile_policies:Hostile", "parameters": {"kind": [*KINDS].index("raises")}},
     {"name": "towards", "parameters": {"x_m": 5.5, "y_m": 5.8, "speed_m_s": 3.0}},
     {"name": "detour", "parameters": {"speed_m_s": 5.0, "clearance_m": 0.05}},
 ]

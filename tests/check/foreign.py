@@ -1,16 +1,8 @@
-"""Third-party code in the report that is forged: a policy that fails, and a claim."""
-
-from typing import NoReturn
+"""A third-party claim, in the report that is forged."""
 
 from airground_drake.sim.trace import Trace
-from airground_drake.uav.policy import Observation, Policy
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
-
-
-class Fails(Policy):
-    def propose(self, seen: Observation) -> NoReturn:
-        raise KeyError("no plan")
 
 
 class Short(TraceClaim):

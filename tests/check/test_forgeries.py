@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from check import concerted
 from check.concerted import FORGERIES, PROGRAMS, make, refused_by, simulating_once
 from check.forgeries import HOSTILE, RULES, UNMENDED
 from check.forging import attempt, edited_report, edited_table, forged, mend, read_table, write, write_table
@@ -55,8 +56,10 @@ def test_a_report_with_third_party_code_is_refused_by_nobody(whole: Path) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FORGERIES)
-def test_the_programs_that_are_due_refuse_a_forgery(whole: Path, name: str) -> None:
+def test_the_programs_that_are_due_refuse_a_forgery(whole: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     due, edit = FORGERIES[name]
+    if due == "iii":  # which looks at no verdict and no page
+        monkeypatch.setattr(concerted, "follow", lambda _: None)
     programs = due.split(", ") if due else PROGRAMS
     assert [*refused_by(forged(whole, edit), programs)] == (programs if due else [])
 

@@ -2,8 +2,6 @@
 
 import hashlib
 import json
-import os
-import shutil
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -11,8 +9,7 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from check.concerted import made_again
-from check.forgeries import HOSTILE, both, everywhere
+from check.forgeries import HOSTILE, all_of, both, everywhere
 from check.forging import claim_of, copy, edited_report, judged, mend
 from commands.conftest import Airground
 
@@ -91,7 +88,7 @@ def test_foreign_files_are_not_judged_again(short: Path, tmp_path: Path, airgrou
 
 def test_another_seed_is_not_reproduced_which_is_exit_code_3(short: Path, tmp_path: Path) -> None:
     folder = copy(short, tmp_path / "copy")
-    made_again(everywhere("seed", value=7), both("seed", value=7))(folder)
+    all_of(everywhere("seed", value=7), both("seed", value=7))(folder)
     lines = [CheckLine(**line, by="simulated again") for line in simulated.lines(folder)]
     (line,) = (line for line in lines if line.outcome == NOT_HERE)
     assert line.text.startswith("states, row 1, t = 0.05 s: ugv")
@@ -100,7 +97,7 @@ def test_another_seed_is_not_reproduced_which_is_exit_code_3(short: Path, tmp_pa
 
 def test_third_party_code_is_simulated_only_where_it_is_allowed(short: Path, tmp_path: Path) -> None:
     folder = copy(short, tmp_path / "copy")
-    made_again(everywhere("intervention", "policies", value=lambda old: [*old, GONE]))(folder)
+    everywhere("intervention", "policies", value=lambda old: [*old, GONE])(folder)
     (line,) = check.made_again(folder, [], LIMIT_S, Progress(), "simulated again", "airground_drake.report.simulated")
     assert line.outcome == OPEN
     assert "third-party code is imported and run only with --allow-plugins" in line.text
@@ -131,7 +128,7 @@ def test_other_line_ends_in_the_page_disagree(short: Path, tmp_path: Path) -> No
     assert r"\r\n" in line["text"]
 
 
-@pytest.mark.skipif(shutil.which("coqc") is None and not os.environ.get("CI"), reason="Coq is not installed")
+@pytest.mark.usefixtures("compiled_before")
 def test_coq_proves_the_runs_again(short: Path, tmp_path: Path, airground: Airground) -> None:
     folder = copy(short, tmp_path / "copy")
     before = digests(folder)

@@ -220,10 +220,10 @@ def test_values_for_reading() -> None:
     assert [sentences.number(x) for x in (None, 14.0, -0.21984, 2.5e-14)] == [
         "\N{EN DASH}", "14", "\N{MINUS SIGN}0.2198", "2.5e\N{MINUS SIGN}14",
     ]  # fmt: skip
-    assert [sentences.told(*x) for x in (([3.3, 5.1], "m"), (1.0, "yes/no"), (None, "m"))] == [
+    assert [sentences.as_text(*x) for x in (([3.3, 5.1], "m"), (1.0, "yes/no"), (None, "m"))] == [
         "(3.3, 5.1) m", "yes", "\N{EN DASH}",
     ]  # fmt: skip
-    assert sentences.told({"gap_m": 0.5, "there": True}) == "gap 0.5 m; there yes"
+    assert sentences.as_text({"gap_m": 0.5, "there": True}) == "gap 0.5 m; there yes"
     data = {"a": [{"x": 1.5, "long": "y" * 90}, {"x": None}], "b": "\u202e"}
     assert yaml.safe_load(html.as_yaml(data)) == data
     assert html.as_yaml(data).isascii()

@@ -124,7 +124,8 @@ def test_a_policy_that_crashes_is_told_with_its_first_traceback_and_may_be_heard
     name = module(CRASHES)
     file = f"{name.partition(':')[0]}.py"
     shown = ["--show-policy-output", "--set", f"intervention.policies=[{{name: '{name}'}}]", "--allow-plugins"]
-    words = ["run", "minimal", "d"] if command == "run" else ["report", "minimal", "-q", "-o", str(tmp_path / "out")]
+    report = ["report", "minimal", "-q", "--format", "json", "-o", str(tmp_path / "out")]
+    words = ["run", "minimal", "d"] if command == "run" else report
     for more in (shown, shown[1:]):
         commands.main([*words, *more])
         lines = capfd.readouterr().err.splitlines()

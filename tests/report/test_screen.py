@@ -285,7 +285,7 @@ def test_headline(methods: str, edits: list[Edit], told: list[tuple[str, str]]) 
 
 def checks(question: str, *edits: Edit) -> list[tuple[str, str]]:
     found = screen_of(document(*edits, methods="cd"))
-    return [(check.mark, check.told) for check in found.checks if check.question == question]
+    return [(check.mark, check.answer) for check in found.checks if check.question == question]
 
 
 def test_triggers() -> None:

@@ -59,8 +59,9 @@ def test_a_uav_that_is_lost_or_has_no_policies_helps_nobody(run: Run, setting: s
     assert not faults_of(trace)
 
 
-@pytest.mark.parametrize("method", ["b", pytest.param("c", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("lost_at_s", [8.23, 12.0])
+@pytest.mark.parametrize(
+    ("method", "lost_at_s"), [("b", 8.23), ("b", 12.0), pytest.param("c", 12.0, marks=pytest.mark.slow)]
+)
 def test_other_methods_forget_what_a_lost_uav_asked_at_its_end_too(method: str, lost_at_s: float) -> None:
     over = {"runs": {method: {"method": method}}, "uavs.south.lost_at_s": lost_at_s, "duration_s": 20.0}
     trace = simulate(load("two_uavs", over), method)

@@ -50,7 +50,6 @@ class Body:
     own_views: bool = False
 
     def __post_init__(self) -> None:
-        """Check the kind and the speed limit."""
         if self.kind not in KINDS:
             raise ValueError(f"body {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}")
         if not self.max_speed_m_s >= 0.0:
@@ -138,7 +137,6 @@ class World:
     unsure_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the order."""
         if any(body.plant is None for body in self.bodies if body.kind in ROBOTS):
             raise ValueError("a robot needs a plant")
         order = [(KINDS.index(body.kind), body.plant is None) for body in self.bodies]

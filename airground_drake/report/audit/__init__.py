@@ -4,23 +4,17 @@
 scenarios or on formulas alone: `python -m airground_drake.report audit`.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from airground_drake.report.audit.item import typeset
-from airground_drake.report.audit.runs import findings
+from airground_drake.report.audit.item import Item
+from airground_drake.report.audit.runs import of_runs
 from airground_drake.scenario.schema import Scenario
-from airground_drake.sim.trace import Trace
 from airground_drake.verify import Verdict
 
 __all__ = ["of_runs", "whole"]
 
 
-def of_runs(scenario: Scenario, traces: Mapping[str, Trace]) -> list[dict[str, Any]]:
-    return typeset(findings(scenario, traces))
-
-
-def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[Item]:
     """All findings but those of the scenario's own runs."""
     from airground_drake.report.audit.companions import companion_findings  # imports Drake
     from airground_drake.report.audit.formulas import formula_findings, reading_findings
@@ -28,4 +22,4 @@ def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[dict[str, Any
 
     proofs = {verdict.claim.id: verdict for verdict in verdicts if not verdict.run}
     computed = [*threshold_findings(scenario, proofs), *formula_findings(scenario), *reading_findings(scenario)]
-    return typeset([*computed, *companion_findings()])
+    return [*computed, *companion_findings()]

@@ -1,6 +1,6 @@
 """The form of a finding about the paper."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from airground_drake.verify import Finding
@@ -20,7 +20,8 @@ CONVERSION = {
 def item(
     number: int, where: str, finding: str, paper: Any, ours: Any, shown: bool, evidence: Item, unit: str = ""
 ) -> Item:
-    """Item `number`, about the place `where` of the paper, with its `evidence`."""
+    """Item `number`, about the place `where` of the paper, with its `evidence` and formulas."""
+    in_the_paper, corrected = FORMULAS.get(number, ((), ()))
     return {
         "id": number,
         "where": where,
@@ -30,6 +31,8 @@ def item(
         "unit": unit,
         "demonstrated": bool(shown),
         "evidence": evidence,
+        "latex": {"paper": list(in_the_paper), "ours": list(corrected)},
+        "conversion": CONVERSION.get(number, ""),
     }
 
 
@@ -131,13 +134,3 @@ FORMULAS: dict[int, tuple[tuple[str, ...], tuple[str, ...]]] = {
         (r"v_{int} = J^+ (\dot\sigma_d + \Lambda (\sigma_d - \sigma))",),
     ),
 }
-
-
-def typeset(items: Iterable[Item]) -> list[dict[str, Any]]:
-    """The items with formulas (`latex`), and whether a conversion error could explain them (`conversion`)."""
-    typeset_items = []
-    for item in items:
-        paper, ours = FORMULAS.get(item["id"], ((), ()))
-        latex = {"paper": list(paper), "ours": list(ours)}
-        typeset_items.append({**item, "latex": latex, "conversion": CONVERSION.get(item["id"], "")})
-    return typeset_items

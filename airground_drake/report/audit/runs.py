@@ -18,7 +18,7 @@ PRINTED_SPEED_M_S = 1.0  # reference speed of Table 1, [3.3, 1t, 0]
 REFERENCE_POINTS = 121  # points of the reference's way that a finding keeps for its figure
 
 
-def findings(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Item]:
+def of_runs(scenario: Scenario, traces: Mapping[str, Trace]) -> list[Item]:
     return [item for item in (_recursion(scenario, traces), _timing(scenario, traces)) if item]
 
 

@@ -11,7 +11,7 @@ from airground_drake.report import rules
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.model import Report
-from airground_drake.report.sentences import told
+from airground_drake.report.sentences import as_text
 from airground_drake.report.view import canvas
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
@@ -114,7 +114,7 @@ def verdicts(report: Report) -> str:
 
 def reproduction(report: Report) -> str:
     rows = [
-        [row.id, row.quantity, told(row.paper, row.unit), told(row.ours, row.unit), row.status.replace("_", " ")]
+        [row.id, row.quantity, as_text(row.paper, row.unit), as_text(row.ours, row.unit), row.status.replace("_", " ")]
         for row in report.reproduction
     ]
     return _table(["", "quantity", "paper", "ours", ""], r"lp{0.45\linewidth}lll", rows)

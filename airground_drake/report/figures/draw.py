@@ -166,8 +166,8 @@ def _trajectories(chosen: _Selection) -> Figure:
     for position, (heading, trace) in enumerate(chosen.shown.items()):
         drawing = maps.plane(trace, chosen.team, frame, keys[heading], lines)
         finals = ", ".join(f"{r} ({x:.2f}, {y:.2f}) m" for r in robots for x, y, _ in [trace.body(r)[-1]])
-        told = "".join(f" {entry.text}." for entry in keys[heading])
-        says = f"Paths of {', '.join(robots)} in the ground plane.{told} Final positions: {finals}."
+        keyed = "".join(f" {entry.text}." for entry in keys[heading])
+        says = f"Paths of {', '.join(robots)} in the ground plane.{keyed} Final positions: {finals}."
         table = _points(trace, robots, maps.marks_of(trace, chosen.team))
         panels.append(panel(drawing, f"trajectories-{position}", f"Map of {heading}", says, heading, table))
     return Figure("trajectories", "Maps", caption, tuple(panels))
@@ -177,8 +177,8 @@ def _points(trace: Trace, robots: list[str], marks: Sequence[maps.Mark]) -> Tabl
     starts, ends = (
         [(r, trace.t[k], word, trace.body(r)[k, :2]) for r in robots] for k, word in ((0, "starts"), (-1, "ends"))
     )
-    told = [(mark.ugv, mark.t_s, maps.told([mark]), mark.at) for mark in marks[:MAX_TABLE_ROWS]]
-    rows = tuple((r, f"{t:.2f}", what, *(f"{x:.3f}" for x in at)) for r, t, what, at in [*starts, *told, *ends])
+    marked = [(mark.ugv, mark.t_s, maps.summary([mark]), mark.at) for mark in marks[:MAX_TABLE_ROWS]]
+    rows = tuple((r, f"{t:.2f}", what, *(f"{x:.3f}" for x in at)) for r, t, what, at in [*starts, *marked, *ends])
     some = f", the first {MAX_TABLE_ROWS} of {len(marks)} events" if len(marks) > MAX_TABLE_ROWS else ""
     return Table(f"Run {trace.run}: what happened where{some}", ("robot", "t, s", "what", "x, m", "y, m"), rows)
 
@@ -226,7 +226,7 @@ def _timelines(chosen: _Selection) -> Figure:
         having = [ugv for ugv in first if events_of(trace, ugv, *timelines.MARKS)]
         rows = having[:MAX_TEAM] or [max(trace.ugvs, key=lambda ugv: trace.column(f"{ugv}.decision_variable_m").max())]
         hidden = max(hidden, len(having) - MAX_TEAM)
-        words = "; ".join(f"{ugv}: {timelines.told(trace, ugv)}" for ugv in rows)
+        words = "; ".join(f"{ugv}: {timelines.events_in_words(trace, ugv)}" for ugv in rows)
         says = f"Threshold {float(trace.meta['zeta_m']):.3g} m. {words}."
         name, heading, drawing = f"timelines-{position}", f"Run {run}", timelines.events(trace, rows)
         panels.append(panel(drawing, name, f"Events over time, {heading}", says, heading, _happened(trace, rows)))

@@ -101,7 +101,7 @@ def _s(t_s: float, digits: int = 2) -> str:
     return f"{t_s:.{digits}f}\N{NO-BREAK SPACE}s"
 
 
-def told(marks: Iterable[Mark]) -> str:
+def summary(marks: Iterable[Mark]) -> str:
     """Marks in words; those that differ only in time are grouped."""
     alike = grouped(((mark.what, mark.why), mark.when) for mark in marks)
     return "; ".join(f"{what} {', '.join(times)}{why}" for (what, why), times in alike.items())
@@ -123,7 +123,7 @@ def key_of(trace: Trace, ugvs: Sequence[str], frame: Frame) -> list[Entry]:
         group = next(known, None)
         groups.append([mark]) if group is None else group.append(mark)
     letters = (chr(ord("A") + k) for k in range(MAX_MARKS))
-    return [Entry(letter, f"{short(of[0].ugv)} {told(of)}", of) for letter, of in zip(letters, groups, strict=False)]
+    return [Entry(letter, f"{short(of[0].ugv)} {summary(of)}", of) for letter, of in zip(letters, groups, strict=False)]
 
 
 def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
@@ -131,12 +131,12 @@ def _of_ugv(trace: Trace, ugv: str, marks: Sequence[Mark]) -> Entry:
     sent = [mark for mark in marks if len(mark.way)]
     others = [mark for mark in marks if not len(mark.way)]
     arrived = events_of(trace, ugv, "arrival")
-    words = [f"arrived at {_s(arrived[-1]['t_s'], 1)}"] if arrived else [told(others[-1:])] if others else []
+    words = [f"arrived at {_s(arrived[-1]['t_s'], 1)}"] if arrived else [summary(others[-1:])] if others else []
     answers = {what: len(of) for what, of in grouped((mark.what, mark) for mark in sent).items()}
     numbers = ", ".join(f"{n} {what}" for what, n in answers.items())
     listed = f": {numbers}" if len(answers) > 1 else f", all {''.join(answers)}"
-    words += [f"{len(sent)} proposals{listed}, the last {told(sent[-1:])}"] if len(sent) > 1 else []
-    words += [f"proposal {told(sent)}"] if len(sent) == 1 else []
+    words += [f"{len(sent)} proposals{listed}, the last {summary(sent[-1:])}"] if len(sent) > 1 else []
+    words += [f"proposal {summary(sent)}"] if len(sent) == 1 else []
     return Entry("", f"{short(ugv)} {'; '.join(words)}", [*others, *sent[-1:]])
 
 

@@ -151,7 +151,7 @@ def events(trace: Trace, ugvs: Sequence[str]) -> Figure:
     clock = Clock.around([event["t_s"] for those in happened.values() for event in those], *_ends_s(trace))
     labels = {ugv: _labels(those, clock) for ugv, those in happened.items()}
     heads = [
-        canvas.short(ugv) if labels[ugv] else fill(f"{canvas.short(ugv)}: {told(trace, ugv)}", TOLD_CHARS)
+        canvas.short(ugv) if labels[ugv] else fill(f"{canvas.short(ugv)}: {events_in_words(trace, ugv)}", TOLD_CHARS)
         for ugv in ugvs
     ]
     lines = [max((label.top for label in labels[ugv]), default=0) for ugv in ugvs]
@@ -244,7 +244,7 @@ def _word(kind: str, t_s: float) -> str:
     return f"{WORDS.get(kind, kind)} {t_s:.2f}"
 
 
-def told(trace: Trace, ugv: str) -> str:
+def events_in_words(trace: Trace, ugv: str) -> str:
     """The events of a UGV with their times; many events are counted by kind; without any, its largest value."""
     marks = events_of(trace, ugv, *MARKS)
     if not marks:

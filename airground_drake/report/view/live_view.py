@@ -31,7 +31,6 @@ class LiveView(LeafSystem):
     FRAMES_PER_S = 30.0
 
     def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:
-        """Draw a valid scenario, and declare the ports."""
         super().__init__()
         self.set_name("live_view")
         world = make_world(scenario)

@@ -113,7 +113,7 @@ class Batch:
             holds=_holds(breaks, places),
             script_of=np.cumsum([0, *(len(times) for times, _ in scripts)], dtype=np.int64),
             script_breaks=np.concatenate([np.zeros(0), *(times for times, _ in scripts)]),
-            script_holds=np.concatenate([np.zeros((0, 3, 2)), *(_with_end(_holds(*script)) for script in scripts)]),
+            script_holds=np.concatenate([np.zeros((0, 3, 2)), *(np.pad(_holds(*script), END) for script in scripts)]),
             room=room(self.planner.max_speed),
             numbers=np.array([
                 control.period_s, SHORT * shortest, 0.01 * ACCURACY * control.period_s,
@@ -399,14 +399,12 @@ def _schedule(
     return np.array(times), np.array([found[t] for t in times], dtype=np.int64)  # nothing writes to them
 
 
+END = ((0, 1), (0, 0), (0, 0))  # an unused row after the pieces of a hold, which then has as many as breaks
+
+
 def _holds(breaks: Array, places: Array) -> Array:
     """Value and slope of each piece of a first-order hold through (K, d) at (K,), s: (K - 1, d, 2)."""
     return np.stack([places[:-1], (places[1:] - places[:-1]) / (breaks[1:] - breaks[:-1])[:, None]], axis=2)
-
-
-def _with_end(holds: Array) -> Array:
-    """Pieces of a first-order hold with an additional unused row, as many as breaks."""
-    return np.concatenate([holds, np.zeros((1, *holds.shape[1:]))])
 
 
 def _accepted(proposals: Sequence[Proposal | None]) -> Accepted:

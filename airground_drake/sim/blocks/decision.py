@@ -250,8 +250,8 @@ class EventTrigger(LeafSystem):
         t, spans = context.get_time(), self._range.Eval(context)
         before, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
         if not are_numbers(spans):
-            told = "from a decision block, a plant or a disturbance"
-            raise PluginError(f"decision_range is not a number, {told}: {short(repr(spans.tolist()))}")
+            source = "from a decision block, a plant or a disturbance"
+            raise PluginError(f"decision_range is not a number, {source}: {short(repr(spans.tolist()))}")
         if anything_due(before, t, spans, levels):
             status = before.copy()
             advance(status, t, self._variable.Eval(context), spans, self._checked_levels(context))

@@ -112,8 +112,8 @@ class Gatekeeper(LeafSystem):
         if desk is not None and self._retry is not None:
             new = self._inbox.Eval(context)[len(self.desk(context).read_s) :]
             asked = {delivery.message.ugv for delivery in new}
-            desk, told = replied(desk, asked, after.answers, after.reports, after.told, t, self._retry)
-            after = replace(after, desk=desk, told=told)
+            desk, sent = replied(desk, asked, after.answers, after.reports, after.sent, t, self._retry)
+            after = replace(after, desk=desk, sent=sent)
         state.get_mutable_abstract_state(self._state).set_value(after)
         return EventStatus.Succeeded()
 

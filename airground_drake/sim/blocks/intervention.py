@@ -154,7 +154,6 @@ class AllProposals(LeafSystem):
     """
 
     def __init__(self, uavs: Sequence[str], count: int) -> None:
-        """Declare ports for some UAVs and so many UGVs."""
         super().__init__()
         self._of_uavs = [Messages(self, f"proposals_{uav}", count, Proposal) for uav in uavs]
         needs = {messages.port.ticket() for messages in self._of_uavs}

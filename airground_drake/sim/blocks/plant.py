@@ -48,12 +48,6 @@ def first_order_plant(robot: str, start: Array) -> LinearSystem:
     return plant
 
 
-def scripted_plant(body: Body) -> TrajectorySource:
-    """The position of a body with a script, (3,), m, world frame; it has no input."""
-    times, places = vertices_of(body)
-    return TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T))
-
-
 def vertices_of(body: Body) -> tuple[Array, Array]:
     """Times, (K,), s, and places, (K, 3), m, of the vertices of a script, at least two."""
     assert isinstance(body.plant, Scripted)
@@ -172,8 +166,8 @@ def declared(
     if ugv_controller is not None:
         other = isinstance(ugv_controller, type) and not issubclass(ugv_controller, System)
         if other or not callable(ugv_controller):
-            told = short(repr(ugv_controller))
-            raise PluginError(f"ugv_controller is {told}; allowed: a subclass of Drake's System, or a function")
+            shown = short(repr(ugv_controller))
+            raise PluginError(f"ugv_controller is {shown}; allowed: a subclass of Drake's System, or a function")
         changed.ugv_controller = OwnController(kind=name_of(ugv_controller))
     return validated(changed, {} if seed is None else {"seed": seed})
 
@@ -368,7 +362,8 @@ def plant_system(body: Body, period_s: float, own: Mapping[str, OwnPlant] = Mapp
     if isinstance(body.plant, Own):
         return own_plant(body, own[body.name].make if body.name in own else None)
     if isinstance(body.plant, Scripted):
-        return scripted_plant(body)
+        times, places = vertices_of(body)
+        return TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T))
     if body.plant is None or not body.plant.signals:
         return first_order_plant(body.name, body.start_m)
     return steered_plant(body, period_s)

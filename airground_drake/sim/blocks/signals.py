@@ -121,5 +121,5 @@ class Messages:
         ):
             return messages
         wanted = " or ".join("None" if kind is type(None) else kind.__name__ for kind in self._kinds)
-        told = f"port {self.port.get_name()} of {self.port.get_system().GetSystemPathname()}"
-        raise PluginError(f"{told} is given {short(repr(messages))}; allowed: {self._count} messages, each {wanted}")
+        port = f"port {self.port.get_name()} of {self.port.get_system().GetSystemPathname()}"
+        raise PluginError(f"{port} is given {short(repr(messages))}; allowed: {self._count} messages, each {wanted}")

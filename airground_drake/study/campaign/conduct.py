@@ -46,7 +46,6 @@ def conduct(
     engine: Engine = "batch",
     progress: Progress = SILENT,
 ) -> dict[str, Any]:
-    """Finish a campaign, and write the evidence and its page."""
     # folder: new or empty; with `resume`, a folder with a part of the same campaign.
     # number: of draws; default: all combinations of the grids.
     if stopping is not None and spec.dependent:
@@ -71,8 +70,8 @@ def conduct(
             rows = died(index) if judged is None else judged
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
-            told = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
-            progress.advance(1.0, f"refuted: {told or 'nothing'}")
+            counts = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
+            progress.advance(1.0, f"refuted: {counts or 'nothing'}")
             if stopping is not None and stopping.met_in_order(index, rows):
                 break
         table = store.table()

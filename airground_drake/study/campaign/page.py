@@ -19,7 +19,7 @@ from airground_drake.study.campaign import swept
 from airground_drake.study.campaign.rows import BATCH, BOTH, CLOCK, DRAKE, JUDGED, SCREENED
 
 BARS = 40
-MOST_TOLD = 8  # sentences about claims on the first screen; the others are folded
+MOST_CLAIMS = 8  # sentences about claims on the first screen; the others are folded
 SHOWN = (rules.DISTANCES, rules.CONDITIONS, rules.ARRIVAL)  # claims whose margins are drawn
 
 
@@ -33,7 +33,7 @@ class Drawing(NamedTuple):
 def page(result: dict[str, Any], table: pd.DataFrame) -> str:
     template = _environment().get_template("campaign.html.j2")
     return template.render(
-        found=result, told=told(result), engines=made_by(result["engines"]), separated=_separated(result),
+        found=result, claim_lines=lines_of(result), engines=made_by(result["engines"]), separated=_separated(result),
         figures=_figures(result, table),
         sweeps=[
             (sweep["key"], sweep["entries"], swept.drawing(sweep["entries"], sweep["key"], f"swept{k}"))
@@ -42,7 +42,7 @@ def page(result: dict[str, Any], table: pd.DataFrame) -> str:
     )  # fmt: skip
 
 
-def told(result: Mapping[str, Any]) -> list[Line]:
+def lines_of(result: Mapping[str, Any]) -> list[Line]:
     """A sentence for each claim, with its bound: violations first, then open claims."""
     lines = []
     for claim in result["claims"]:
@@ -71,16 +71,16 @@ def told(result: Mapping[str, Any]) -> list[Line]:
 def made_by(engines: Mapping[str, int]) -> str:
     screens, compared, clock = (engines.get(name, 0) for name in (SCREENED, BOTH, CLOCK))
     loop = screens + engines.get(BATCH, 0) + compared + clock
-    said = [f"Drake made {engines[DRAKE]} of these runs"] if engines.get(DRAKE) else []
+    clauses = [f"Drake made {engines[DRAKE]} of these runs"] if engines.get(DRAKE) else []
     if loop:
-        said.append(f"the compiled loop made {loop}, and Drake {compared} of them again, bit by bit the same")
+        clauses.append(f"the compiled loop made {loop}, and Drake {compared} of them again, bit by bit the same")
     if screens:
         others = "the others were judged by their traces"
-        said.append(f"array judges screened {screens} of them without a trace, which proves nothing; {others}")
+        clauses.append(f"array judges screened {screens} of them without a trace, which proves nothing; {others}")
     if clock:
-        said.append(f"{clock} are not compared, because a policy met its limit of time by the clock")
-    told = "; ".join(said)
-    return f"{told[:1].upper()}{told[1:]}." if told else ""
+        clauses.append(f"{clock} are not compared, because a policy met its limit of time by the clock")
+    sentence = "; ".join(clauses)
+    return f"{sentence[:1].upper()}{sentence[1:]}." if sentence else ""
 
 
 class Separation(NamedTuple):
@@ -169,5 +169,5 @@ def _histogram(values: Array, title: str, label: str, mark: float | None) -> tup
 def _environment() -> Environment:
     environment = environment_of("airground_drake.study.campaign", "airground_drake.report")
     environment.filters["num"] = number
-    environment.globals.update(marks=MARKS, most_told=MOST_TOLD)
+    environment.globals.update(marks=MARKS, most_claims=MOST_CLAIMS)
     return environment

@@ -199,7 +199,9 @@ def load_spec(path: Path) -> Spec:
     file: File = filled(File, document)
     scenario = file.scenario if file.scenario in shipped() else str(path.parent / file.scenario)
     given = vars(file) | {"scenario": scenario}
-    spec = Spec(**given, digest=files.sha256(content), source=str(path), data=_judged_part(scenario))
+    data = read(scenario)[0].data
+    data = data | NOT_JUDGED if isinstance(data, dict) else {}  # `Spec.base` refuses it, with the line
+    spec = Spec(**given, digest=files.sha256(content), source=str(path), data=data)
     _check_overrides(spec, document)
     _check_names(spec, document)
     return spec
@@ -248,8 +250,3 @@ def _unknown(source: str, key: str, name: str, allowed: Iterable[str]) -> Scenar
 def _identifier(name: str) -> str:
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     return f"_{plain}" if plain[0].isdigit() else plain
-
-
-def _judged_part(scenario: str) -> dict[str, Any]:
-    data = read(scenario)[0].data
-    return data | NOT_JUDGED if isinstance(data, dict) else {}  # `Spec.base` refuses it, with the line

@@ -35,7 +35,6 @@ class Store:
     """The open folder of a campaign. One command at a time can open it."""
 
     def __init__(self, folder: Path, manifest: dict[str, Any], *, resume: bool) -> None:
-        """Open the folder, and read the finished draws."""
         # folder: new or empty; with `resume`, a folder of the same campaign.
         files.make_folder(folder, "the campaign")
         self.folder = folder

@@ -40,8 +40,8 @@ def per_run(table: pd.DataFrame) -> pd.DataFrame:
     runs = table.drop_duplicates(["index", "run"]).set_index(["index", "run"])
     keys = pd.DataFrame([_plain(text) for text in runs["drawn"]], runs.index)
     judged = table[table["claim"] != ""].set_index(["index", "run", "claim"])
-    said = [outcome(*pair) for pair in zip(judged["status"], judged["exercised"], strict=True)]
-    verdicts = pd.Series(said, judged.index, dtype=object).unstack()  # noqa: PD010 - `pivot_table` leaves out
+    outcomes = [outcome(*pair) for pair in zip(judged["status"], judged["exercised"], strict=True)]
+    verdicts = pd.Series(outcomes, judged.index, dtype=object).unstack()  # noqa: PD010 - `pivot_table` leaves out
     margins = judged["margin"].unstack().add_suffix(MARGIN)  # noqa: PD010 - claims without margins
     claims = [name for claim in verdicts for name in (claim, f"{claim}{MARGIN}")]
     joined = pd.concat([keys, runs[list(OF_A_RUN)], verdicts, margins], axis=1).reindex(runs.index).reset_index()

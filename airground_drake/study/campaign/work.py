@@ -40,7 +40,7 @@ from airground_drake.verify import Verdict, array_judges, judge
 from airground_drake.verify.array_judges import SAME, ArrayJudges, NoScreenError, triggers
 from airground_drake.verify.registry import run_claims
 
-SHARE = 0.005  # share of the loop's faultless runs that Drake repeats
+SHARE = 0.005  # share of the loop's faultless runs that Drake repeats, chosen by hash
 
 
 class DrawOutOfTime(BaseException):
@@ -48,15 +48,7 @@ class DrawOutOfTime(BaseException):
 
 
 class DifferenceError(AirgroundError):
-    """Two results that must agree differ; ends a campaign."""
-
-
-class EnginesDifferError(DifferenceError):
-    """Drake and the compiled loop made different runs of one draw."""
-
-
-class JudgesDifferError(DifferenceError):
-    """An array judge and the judge of traces came to different verdicts on one run."""
+    """Both engines, or both judges, differ about one run; ends a campaign."""
 
 
 def rows_of(spec: Spec, index: int, limits: Limits, engine: Engine = "batch") -> list[Row]:
@@ -153,7 +145,8 @@ def _judged(scenario: Scenario, run: str, claims: Collection[str], index: int, e
     # A policy's limit is wall-clock time, so Drake's run may exceed it at another plan.
     clock = any(OutOfTime.__name__ in asking.what for asking in made.memory.asked)
     screens = screened(loop, made, claims)
-    chosen = _is_chosen(index, run)
+    by_hash = int.from_bytes(hashlib.sha256(f"{index} {run}".encode()).digest()[:8])
+    chosen = by_hash < SHARE * 2**64
     if screens and not chosen and not any(_is_failure(verdict) for verdict in screens):
         return _Judged(screens, happened(loop, made), CLOCK if clock else SCREENED)
     trace = made.trace()
@@ -164,12 +157,6 @@ def _judged(scenario: Scenario, run: str, claims: Collection[str], index: int, e
     return _Judged(verdicts, happened_in(trace), made_by)
 
 
-def _is_chosen(index: int, run: str) -> bool:
-    """Whether Drake repeats a run without a failure: a share of all runs, chosen by hash."""
-    told = hashlib.sha256(f"{index} {run}".encode()).digest()
-    return int.from_bytes(told[:8]) < SHARE * 2**64
-
-
 def _is_failure(verdict: Verdict) -> bool:
     """Whether Drake repeats a run because of an undeclared failure."""
     # A narrow margin is no reason: what array judges cannot decide, the judge of traces decides, on traces that equal
@@ -178,29 +165,29 @@ def _is_failure(verdict: Verdict) -> bool:
 
 
 def _agree(screens: Sequence[Verdict], verdicts: Sequence[Verdict], trace: Trace) -> None:
-    """Raise a JudgesDifferError if an array judge and the trace judge disagree."""
+    """Raise a DifferenceError if an array judge and the trace judge disagree."""
     for ours, theirs in zip(screens, verdicts, strict=True) if screens else ():
         numbers = [float("nan") if verdict.margin is None else verdict.margin for verdict in (ours, theirs)]
         same = (ours.status, ours.exercised) == (theirs.status, theirs.exercised)
         if not same or not np.isclose(numbers[0], numbers[1], rtol=0.0, atol=SAME, equal_nan=True):
-            told = [
+            words = [
                 f"{verdict.status}, margin {verdict.margin}, {verdict.exercised} times" for verdict in (ours, theirs)
             ]
             where = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}"
-            said = f"{where}: {ours.claim.id} is {told[1]} by the trace and {told[0]} by the array judge"
-            raise JudgesDifferError(f"{said}; --engine drake does without")
+            difference = f"{where}: {ours.claim.id} is {words[1]} by the trace and {words[0]} by the array judge"
+            raise DifferenceError(f"{difference}; --engine drake does without")
 
 
 def _compared(trace: Trace, by_drake: Trace) -> str:
-    """The engine of a run, after a comparison bit by bit; raises EnginesDifferError."""
+    """The engine of a run, after a comparison bit by bit; raises DifferenceError."""
     from airground_drake.report.difference import first_difference  # slow to import, and rarely needed
 
     if any(OutOfTime.__name__ in fault["what"] for fault in by_drake.meta["faults"]):
         return CLOCK
     if (difference := first_difference(by_drake, trace)) is not None:
         about, drakes, ours = difference
-        told = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"
-        raise EnginesDifferError(f"{told} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")
+        quantity = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"
+        raise DifferenceError(f"{quantity} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")
     return BOTH
 
 

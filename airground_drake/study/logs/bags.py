@@ -162,7 +162,6 @@ def _gather(messages: Iterator[Message], gathered: Gathered, size: int) -> None:
 
 
 def _decoder(channel: Channel) -> Decode | None:
-    """The decoder of a channel; None if no decoder fits."""
     if channel.encoding == "json":
         return json.loads
     if channel.encoding == "protobuf":

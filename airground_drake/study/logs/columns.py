@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from airground_drake.base.errors import LogError
@@ -37,6 +38,7 @@ COUNTERS = (
     "frame_index", "frame_idx", "step", "tick", "sample",
 )  # fmt: skip
 TARGETS = ("t", "body", "frame", "x", "y", "z")  # targets of `--map-columns`
+listed = partial(some, most=12)  # columns in a message
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 _SUFFIX = re.compile(r"(.+?)\s*[_/]\s*(mm|cm|m|s|ms|us|ns|secs?|seconds|msec|usec|nsec)", re.IGNORECASE)
 _AXIS = re.compile(r"(?:(.*?)[/._\s:|-])?(?:(?:t|p|pos|position|pose|translation)_?)?([xyz])", re.IGNORECASE)
@@ -87,14 +89,11 @@ class Columns(NamedTuple):
 
     def refuse_unused(self, used: Collection[int | None]) -> None:
         """Raise LogError for a column named by `--map-columns` that is not among the `used` ones."""
-        by_choice: dict[str, list[int]] = {}
-        for k, said in self.chosen.items():
-            by_choice.setdefault(said, []).append(k)
-        for said, those in by_choice.items():
-            if not any(k in used for k in those):
-                raise LogError(
-                    f"--map-columns {said} has no effect on this table; wanted: only columns that are needed"
-                )
+        effective = {option for k, option in self.chosen.items() if k in used}
+        for option in self.chosen.values():
+            if option not in effective:
+                wanted = "wanted: only columns that are needed"
+                raise LogError(f"--map-columns {option} has no effect on this table; {wanted}")
 
 
 def columns(labels: Sequence[str], chosen: Mapping[str, str], bodies: Collection[str]) -> Columns:
@@ -172,10 +171,6 @@ def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str]
             renamed[k] = f"{hit['body']}.{target}" if len(names) > 1 else target
             mapped[k] = f"{target}={pattern}"
     return renamed, mapped
-
-
-def listed(names: Sequence[str], most: int = 12) -> str:
-    return some(names, most)
 
 
 def _last(label: str) -> str:

@@ -450,7 +450,7 @@ def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
     ]  # fmt: skip
     bodies = {
         name: {
-            **track.told, "samples": len(track.t_s), "first_s": float(track.t_s[0]), "last_s": float(track.t_s[-1]),
+            **track.origin, "samples": len(track.t_s), "first_s": float(track.t_s[0]), "last_s": float(track.t_s[-1]),
             "gap_s": track.gap_s, "recorded_s": [list(span) for span in track.spans],
         }
         for name, track in tracks.bodies.items()
@@ -462,5 +462,5 @@ def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
     return {
         "status": judged.status, "covered": covered, "pairs": pairs, "bodies": bodies,
         "speeds_m_s": {name: list(both) for name, both in judged.speeds_m_s.items()}, "starts_away_m": judged.away_m,
-        "said": tracks.said, "not_used": tracks.ignored, "not_judged": list(judged.not_judged),
+        "said": tracks.remarks, "not_used": tracks.ignored, "not_judged": list(judged.not_judged),
     }  # fmt: skip

@@ -140,7 +140,6 @@ class Gathered:
             self._rows.setdefault(key, []).append((min(received_ns, LAST_NS), place.stamp_ns, place.xyz))
 
     def streams(self) -> Iterator[Stream]:
-        """One stream per topic, body, frame and child frame."""
         for (topic, body, frame, child), rows in self._rows.items():
             rows.sort(key=lambda row: row[0])  # by receipt: a file may have them in the order of its parts
             without = sum(stamp is None for _, stamp, _ in rows)
@@ -164,14 +163,9 @@ class Gathered:
             )
             if stamped and without:
                 stream.skipped["no stamp"] = without
-            good = np.isfinite(xyz[:, :2]).all(axis=1)
-            if not good.all():
-                first = int(np.argmin(good))
-                stream.skipped["not finite"] = int((~good).sum())
-                stream.first_skipped["not finite"] = f"message {first + 1}"
-                stream.whole, stream.nano, stream.places = whole[good], stream.nano[good], xyz[good]
+            is_finite = np.isfinite(xyz[:, :2]).all(axis=1)
+            stream.skip(np.where(is_finite, "", "not finite"), "message", range(1, len(rows) + 1))
             yield stream
 
     def ignored(self) -> list[str]:
-        """Descriptions of the unused topics."""
         return [f"{topic} ({kind})" for topic, kind in sorted(self.unused.items())]

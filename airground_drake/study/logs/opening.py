@@ -24,10 +24,10 @@ def opened(paths: Sequence[Path], wanted: Wanted) -> Log:
             try:
                 log.add(_read(path, wanted))
             except LogError as error:
-                told = one_line(f"{path}: {error}")
+                message = one_line(f"{path}: {error}")
                 if not outer.is_dir():
-                    raise LogError(told) from None
-                log.unusable.append(told)
+                    raise LogError(message) from None
+                log.unusable.append(message)
     if log.unusable and not log.streams:
         raise LogError(log.unusable[0])
     log.ignored += log.unusable

@@ -56,7 +56,7 @@ def page(
         "judged.html.j2", judged=judged, tracks=tracks, scenario=scenario, logs=logs, replay=replay, words=words,
         figures=drawn, errors={name: error_m for name, error_m in errors_m.items() if error_m}, most=MOST_ROWS,
         mark={KEPT: "yes" if judged.covers_all else "partly", BROKEN: "no"}.get(judged.status, "open"),
-        marks_of={KEPT: "yes", BROKEN: "no"}, remarks=[*tracks.said, *words.remarks(judged)],
+        marks_of={KEPT: "yes", BROKEN: "no"}, remarks=[*tracks.remarks, *words.remarks(judged)],
     )  # fmt: skip
 
 

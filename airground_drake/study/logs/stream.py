@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -60,7 +61,6 @@ class Stream:
 
     @property
     def label(self) -> str:
-        """Its name in messages."""
         return f"{self.name} ({self.child})" if self.child and self.child != self.name else self.name
 
     def ns(self, unit: str) -> Whole:
@@ -74,6 +74,15 @@ class Stream:
         """Times since the least stamp, (n,), s, if stamps are in a unit of time."""
         since = (self.whole - self.whole.min(initial=LAST)).view(np.uint64)  # differences of 64 bits wrap around
         return (since + self.nano / 1e9) / PER_S[unit]
+
+    def skip(self, reasons: npt.NDArray[Any], noun: str, numbers: Sequence[int], uncounted: str = "") -> None:
+        """Leave out the rows with a reason, (n,), '' for none, and count them by it, except for one reason."""
+        # noun, numbers: what a row is called in the source, such as "line", and its number there, (n,)
+        for k in np.flatnonzero((reasons != "") & (reasons != uncounted)).tolist():
+            self.skipped[reasons[k]] += 1
+            self.first_skipped.setdefault(reasons[k], f"{noun} {numbers[k]}")
+        good = reasons == ""
+        self.whole, self.nano, self.places = self.whole[good], self.nano[good], self.places[good]
 
 
 @dataclass(eq=False)

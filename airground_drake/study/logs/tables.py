@@ -41,7 +41,6 @@ class Wanted(NamedTuple):
 
 
 def read(path: Path, content: bytes, wanted: Wanted) -> Log:
-    """The streams of a table: a text, or Parquet."""
     table = _parquet(content) if content[:4] == b"PAR1" else text.read(content)
     labels = table.labels
     no_words = all(not line.strip() or line.lstrip().startswith("#") for line in table.above)
@@ -127,7 +126,9 @@ def _of_bodies(has: Columns, table: text.Table, wanted: Wanted, path: Path) -> C
     if wide:
         return has._replace(body=None, places=wide)
     text_columns: list[int] = [has.body] if has.body is not None else []
-    text_columns += [k for k in range(len(table.labels)) if k not in text_columns and k not in _numbers_of(has)]
+    numbers = {k for place in has.places for k in (place.x, place.y, place.z)} | {has.frame}
+    numbers |= {k for time in has.times for k in (time.whole, time.rest)}
+    text_columns += [k for k in range(len(table.labels)) if k not in text_columns and k not in numbers]
     for k in text_columns:
         values = table.cells[k].unique()
         if len(values) <= MOST_BODIES and any(wanted.body(value) for value in values):
@@ -139,11 +140,6 @@ def _of_bodies(has: Columns, table: text.Table, wanted: Wanted, path: Path) -> C
     if has.body is not None:
         return has._replace(places=_one_place(has.places))
     return has
-
-
-def _numbers_of(has: Columns) -> set[int | None]:
-    places = {k for place in has.places for k in (place.x, place.y, place.z)}
-    return places | {k for time in has.times for k in (time.whole, time.rest)} | {has.frame}
 
 
 def _one_place(places: list[Place]) -> list[Place]:
@@ -191,20 +187,10 @@ def _streams(path: Path, table: text.Table, has: Columns, wanted: Wanted) -> Ite
                 is_file=is_file,
                 counts_frames=counts_frames(table.labels[time.whole]),
             )
+            # empty rows between those of other bodies do not count
             is_sparse = has.body is None and len(has.places) > 1 and bool((why == "empty").mean() > 0.5)
-            yield _stream(stream, why[at], [table.lines[k] for k in at], is_sparse=is_sparse)
-
-
-def _stream(raw: Stream, why: npt.NDArray[np.object_], lines: list[int], *, is_sparse: bool) -> Stream:
-    """A stream without unusable rows, which it counts, except for empty rows between those of other bodies."""
-    good = why == ""
-    for k in np.flatnonzero(~good).tolist():
-        if is_sparse and why[k] == "empty":
-            continue
-        raw.skipped[why[k]] += 1
-        raw.first_skipped.setdefault(why[k], f"line {lines[k]}")
-    raw.whole, raw.nano, raw.places = raw.whole[good], raw.nano[good], raw.places[good]
-    return raw
+            stream.skip(why[at], "line", [table.lines[k] for k in at], "empty" if is_sparse else "")
+            yield stream
 
 
 def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.object_]]:

@@ -56,9 +56,9 @@ def read(content: bytes) -> Table:
     unnamed = next((k for k in range(count) if any(row[count - 1 - k] for row in rows)), 0)
     labels, header = _header(lines[:first], delimiter, count, unnamed)
     if len(header) > MOST_HEADERS:
-        said = short(lines[max(header)])
+        line = short(lines[max(header)])
         raise LogError(
-            f"lines {min(header) + 1} to {first} have words where most lines have numbers: line {first} is {said}"
+            f"lines {min(header) + 1} to {first} have words where most lines have numbers: line {first} is {line}"
         )
     data = [k for k in full if k >= first]
     if len(data) > MOST_ROWS:

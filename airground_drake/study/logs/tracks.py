@@ -58,7 +58,7 @@ class Track:
     t_s: Array  # times, (n,)
     places_m: Array  # (n, 3); z is nan if the log lacks it
     gap_s: float  # motion between two samples that are farther apart is unknown
-    told: dict[str, str] = field(default_factory=dict)  # origin: stream, frame and clock
+    origin: dict[str, str] = field(default_factory=dict)  # stream, frame and clock
     leaps_s: tuple[float, ...] = ()  # times of samples that the body cannot have reached from the previous sample
     usual_s: float = 0.0  # usual time between two samples
 
@@ -84,7 +84,7 @@ class Tracks:
     """The bodies of a log."""
 
     bodies: dict[str, Track]  # tracks by name
-    said: list[str]  # remarks on the import for the reader
+    remarks: list[str]  # remarks on the import for the reader
     ignored: list[str]  # what was not used
     origin: str = ""  # meaning of time 0; '' for the log's own clock
 
@@ -129,11 +129,11 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
         if not (np.abs(np.nan_to_num(stream.places)) <= LARGEST * max(PER_M.values())).all():
             raise LogError(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres")
     axes.chosen(streams, choice.axes)
-    said = units.settle(streams, scenario, choice.time_unit, choice.length_unit, choice.rate_hz)
+    remarks = units.settle(streams, scenario, choice.time_unit, choice.length_unit, choice.rate_hz)
     for name, letters in choice.axes.items():
         whose = f"axes of {name}" if name else "axes"
-        said.append(f"{whose}: {letters} are x, y, z, as chosen")
-    said += axes.recognised(streams, scenario, streams if "" in choice.axes else choice.axes)
+        remarks.append(f"{whose}: {letters} are x, y, z, as chosen")
+    remarks += axes.recognised(streams, scenario, streams if "" in choice.axes else choice.axes)
     movers = [name for name, obstacle in scenario["obstacles"].items() if obstacle["moves"]]
     for name in (*scenario["ugvs"], *choice.uavs, *movers):
         if name not in streams and name not in choice.without:
@@ -144,7 +144,7 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
             raise LogError(_not_there(name, log, choice))
     if len(clocks := {stream.clock for stream in streams.values() if stream.clock in OF_MESSAGES}) > 1:
         late = ", ".join(name for name, stream in streams.items() if stream.clock == RECEIPT)
-        said.append(f"clocks differ: {late} by {RECEIPT}, others by {(clocks - {RECEIPT}).pop()}")
+        remarks.append(f"clocks differ: {late} by {RECEIPT}, others by {(clocks - {RECEIPT}).pop()}")
     stamps = {name: stream.ns(stream.time_unit) for name, stream in streams.items()}
     first = min(int(ns.min()) for ns in stamps.values())
     zero = first if first >= SINCE_1970_NS else 0
@@ -153,25 +153,27 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
         ns, flat = stamps[name] - zero, np.isnan(stream.places[:, 2])
         if flat.any() and name not in scenario["ugvs"] and name not in scenario["obstacles"]:
             if flat.all():
-                said.append(f"{name} has no height in the log: its distances are not judged")
+                remarks.append(f"{name} has no height in the log: its distances are not judged")
                 continue
             stream.skipped["no height"] += int(flat.sum())
             stream.places, ns = stream.places[~flat], ns[~flat]
-        tracks[name] = _track(name, stream, ns, choice.gap_s, _fastest(name, scenario), _start(name, scenario), said)
+        robot = robots_of(scenario).get(name)
+        start = None if robot is None else np.array(robot["start_m"][:2], dtype=np.float64)
+        tracks[name] = _track(name, stream, ns, choice.gap_s, _fastest(name, scenario), start, remarks)
     for uav in uavs_of(scenario):
         if uav not in streams and uav not in choice.without:
-            said.append(f"{uav} is not in the log: its distances are not judged")
+            remarks.append(f"{uav} is not in the log: its distances are not judged")
     if choice.uavs and not scenario["safe_distance"].get("uav_m"):
-        said.append("distances between UAVs are not judged: the scenario promises none")
+        remarks.append("distances between UAVs are not judged: the scenario promises none")
     for name in tracks:
         if plants := [plant["kind"] for plant in robots_of(scenario).get(name, {}).get("plant", ())]:
-            told = f"{name} is no point that goes where it is told ({', '.join(plants)})"
-            said.append(f"{told}: what its body lacks of the law need be no fault of its controller")
+            is_other = f"{name} is no point that goes where it is told ({', '.join(plants)})"
+            remarks.append(f"{is_other}: what its body lacks of the law need be no fault of its controller")
     if not tracks:
         raise LogError("no body is left to judge")
     _apart_at_the_start(tracks, scenario)
-    _heights(tracks, scenario, said)
-    return Tracks(tracks, said, [*log.ignored, *ignored], f"{first / 1e9:.6f} s since 1970" if zero else "")
+    _heights(tracks, scenario, remarks)
+    return Tracks(tracks, remarks, [*log.ignored, *ignored], f"{first / 1e9:.6f} s since 1970" if zero else "")
 
 
 def _not_there(name: str, log: Log, choice: Choice) -> str:
@@ -289,24 +291,18 @@ def _fastest(name: str, scenario: Json) -> float:
     return limits.get(name, max(expected, *limits.values()))
 
 
-def _start(name: str, scenario: Json) -> Array | None:
-    """Where a robot of the scenario starts, (2,), m."""
-    robots = robots_of(scenario)
-    return np.array(robots[name]["start_m"][:2], dtype=np.float64) if name in robots else None
-
-
 def _track(
-    name: str, stream: Stream, ns: Whole, gap_s: float, fastest_m_s: float, start: Array | None, said: list[str]
+    name: str, stream: Stream, ns: Whole, gap_s: float, fastest_m_s: float, start: Array | None, remarks: list[str]
 ) -> Track:
     """The track of a stream, whose stamps are ns after time 0: sorted, each time once."""
     places = stream.places / PER_M[stream.length_unit]
     if not (np.abs(np.nan_to_num(places)) <= LARGEST).all():
         raise LogError(f"{name} has a value beyond {LARGEST:g}; wanted: seconds and metres")
     for reason, count in stream.skipped.items():
-        said.append(f"{name}: {counted(count, 'row')} skipped, {reason}{_where(stream, reason)}")
+        remarks.append(f"{name}: {counted(count, 'row')} skipped, {reason}{_where(stream, reason)}")
     _of_one_recording(name, ns, places, fastest_m_s)
     if disorder := int((np.diff(ns) < 0).sum()):
-        said.append(f"{name}: rows are not in the order of time in {disorder} places; they were sorted")
+        remarks.append(f"{name}: rows are not in the order of time in {disorder} places; they were sorted")
     order = np.argsort(ns, kind="stable")
     ns, places = ns[order], places[order]
     new = np.append(True, np.diff(ns) > 0)
@@ -314,7 +310,7 @@ def _track(
     apart = np.linalg.norm(np.nan_to_num(places - places[first]), axis=1)
     same, other = (~new) & (apart <= SAME_M), (~new) & (apart > SAME_M)
     if same.any():
-        said.append(f"{name}: {counted(int(same.sum()), 'row')} repeated; each counts once")
+        remarks.append(f"{name}: {counted(int(same.sum()), 'row')} repeated; each counts once")
     if other.sum() > CONTRADICTORY * len(ns):
         raise LogError(
             f"{name}: {int(other.sum())} of {len(ns)} rows are elsewhere at the same time as another row; "
@@ -322,27 +318,27 @@ def _track(
         )
     if other.any():
         k = int(np.argmax(np.where(other, apart, -1.0)))
-        said.append(
+        remarks.append(
             f"{name}: {counted(int(other.sum()), 'row')} not where an earlier one of the same time is, at "
             f"{ns[k] / 1e9:.6g} s by {apart[k]:.3g} m; the earlier one counts"
         )
     t_s, places = ns[new] / 1e9, places[new]
     lost = _lost(t_s, places, fastest_m_s, start)
     if lost.any():
-        said.append(
+        remarks.append(
             f"{name}: {counted(int(lost.sum()), 'row')} skipped, where it cannot have been: taken as lost, first at "
             f"{t_s[lost][0]:.6g} s"
         )
     t_s, places = t_s[~lost], places[~lost]
     leaps = t_s[1:][_leaps(t_s, places, fastest_m_s)]
     if len(leaps):
-        said.append(
+        remarks.append(
             f"{name}: {len(leaps)} steps that are more than {LOST:g} times faster than {fastest_m_s:g} m/s, first to "
             f"{leaps[0]:.6g} s: nothing is claimed of them"
         )
     usual = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
-    told = {"stream": stream.label, "frame": stream.frame, "clock": stream.clock, "source": stream.source}
-    return Track(t_s, places, gap_s or GAP * usual, told, tuple(leaps.tolist()), usual)
+    origin = {"stream": stream.label, "frame": stream.frame, "clock": stream.clock, "source": stream.source}
+    return Track(t_s, places, gap_s or GAP * usual, origin, tuple(leaps.tolist()), usual)
 
 
 def _of_one_recording(name: str, ns: Whole, places: Array, fastest_m_s: float) -> None:
@@ -407,14 +403,14 @@ def _apart_at_the_start(tracks: Mapping[str, Track], scenario: Json) -> None:
         )
 
 
-def _heights(tracks: Mapping[str, Track], scenario: Json, said: list[str]) -> None:
+def _heights(tracks: Mapping[str, Track], scenario: Json, remarks: list[str]) -> None:
     flat = []
     for name, track in tracks.items():
         if np.isnan(track.places_m[:, 2]).any():
             track.places_m[:, 2] = height_m(scenario, name)
             flat.append(name)
     if flat:
-        said.append(f"no height in the log: {', '.join(flat)}; taken from the scenario")
+        remarks.append(f"no height in the log: {', '.join(flat)}; taken from the scenario")
 
 
 def height_m(scenario: Json, name: str) -> float:

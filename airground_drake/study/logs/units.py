@@ -49,28 +49,27 @@ class _Motion(NamedTuple):
 
 
 def settle(
-    streams: Mapping[str, Stream], scenario: Json, time_unit: str = "", length_unit: str = "", rate_hz: float = 0.0
+    streams: Mapping[str, Stream], scenario: Json, time_unit: str, length_unit: str, rate_hz: float
 ) -> list[str]:
     """Set the units of every stream; returns remarks on other units than seconds and metres."""
-    # time_unit: of streams that do not say theirs; '' to find out.
-    # length_unit: of streams that do not say theirs; '' to find out.
+    # time_unit, length_unit: of streams that do not say theirs; '' to find out.
     # rate_hz: frames per second of streams whose times are numbers of frames; 0 without such streams.
-    said = dict[str, None]()
+    remarks = dict[str, None]()
     if rate_hz:
         _of_frames(streams, rate_hz)
-        said[f"times are numbers of frames, {rate_hz:g} per second: as chosen"] = None
+        remarks[f"times are numbers of frames, {rate_hz:g} per second: as chosen"] = None
     for stream in streams.values():
         stated = stream.time_unit, stream.length_unit
         for unit, stamps, what in ((stated[0], stream.clock, "times"), (stated[1], "", "lengths")):
             if unit not in ("", "s", "m") and not (unit == "ns" and stamps in OF_MESSAGES) and not rate_hz:
-                said[f"{what} are in {NAMES[unit]}, as the file says"] = None
+                remarks[f"{what} are in {NAMES[unit]}, as the file says"] = None
         if stream.counts_frames and not (stated[0] or time_unit):
             raise LogError(f"the times of {stream.label} are numbers of frames ({stream.clock}); {_WANTED}")
         stream.time_unit = stream.time_unit or time_unit or _since_1970(stream, float(scenario["duration_s"]))
         stream.length_unit = stream.length_unit or length_unit
         if stream.time_unit in ("ms", "us", "ns") and not stated[0]:
             why = "as chosen" if time_unit else "by their size, stamps since 1970"
-            said[f"times are in {NAMES[stream.time_unit]}: {why}"] = None
+            remarks[f"times are in {NAMES[stream.time_unit]}: {why}"] = None
     open_time = [stream for stream in streams.values() if not stream.time_unit]
     open_length = [stream for stream in streams.values() if not stream.length_unit]
     if open_time or open_length:
@@ -78,13 +77,13 @@ def settle(
             name: stream for name, stream in streams.items() if name in robots_of(scenario) and len(stream.whole) > 1
         }
         time, length, whys = _likely(judged, scenario)
-        said |= dict.fromkeys(whys)
+        remarks |= dict.fromkeys(whys)
         _alike({name: stream for name, stream in judged.items() if not stream.length_unit}, length, scenario)
         for undecided in open_time:
             undecided.time_unit = time
         for undecided in open_length:
             undecided.length_unit = length
-    return list(said)
+    return list(remarks)
 
 
 _WANTED = "wanted: --rate-hz with the frames per second, such as --rate-hz 25"

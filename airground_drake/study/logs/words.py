@@ -7,13 +7,13 @@ from airground_drake.report.sentences import some
 from airground_drake.study.logs.judging import BROKEN, KEPT, OPEN, Judged, JudgedPair
 from airground_drake.study.logs.tracks import Span, Tracks
 
-LEAST_TOLD_M = 0.0005  # smaller approaches do not count, m
+LEAST_MOVE_M = 0.0005  # smaller approaches do not count, m
 # A robot that starts farther away from its start in the scenario, and from its safe distance, is named, m.
 ELSEWHERE_M = 0.05
 FASTER = 1.01  # a robot faster than this multiple of its limit is named; less may be position noise
 LONGER = 1.01  # a log longer than the scenario by more than this gets a remark
 # Broken pairs, all pairs, stretches of one pair, and remarks that are printed; `--json` and the page have all.
-MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_SAID = 3, 20, 4, 12
+MOST_NAMED, MOST_PAIRS, MOST_SPANS, MOST_NOTES = 3, 20, 4, 12
 
 
 def headline(judged: Judged) -> str:
@@ -52,20 +52,20 @@ def least(pair: JudgedPair) -> str:
 
 
 def spans(those: Sequence[Span]) -> str:
-    told = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those]
-    return some(told, MOST_SPANS)
+    periods = [f"{span.begin:.3f} to {span.end:.3f} s" for span in those]
+    return some(periods, MOST_SPANS)
 
 
 def doing(pair: JudgedPair) -> str:
-    told = []
+    moves = []
     for name, came in sorted(pair.came_m.items(), key=lambda item: -item[1]):
-        if came >= LEAST_TOLD_M:
-            told.append(f"{name} came {came:.3f} m nearer")
-        elif came <= -LEAST_TOLD_M:
-            told.append(f"{name} moved {-came:.3f} m away")
+        if came >= LEAST_MOVE_M:
+            moves.append(f"{name} came {came:.3f} m nearer")
+        elif came <= -LEAST_MOVE_M:
+            moves.append(f"{name} moved {-came:.3f} m away")
         else:
-            told.append(f"{name} moved neither nearer nor away")
-    return f"in the second before, {', '.join(told)}"
+            moves.append(f"{name} moved neither nearer nor away")
+    return f"in the second before, {', '.join(moves)}"
 
 
 def law(pair: JudgedPair) -> str:
@@ -95,20 +95,20 @@ def remarks(judged: Judged) -> Iterator[str]:
             yield f"{name} moves at up to {speed:.3g} m/s, above its limit of {limit:g} m/s"
     near = min((pair.safe_m for pair in judged.pairs), default=0.0)
     if off := {name: away for name, away in judged.away_m.items() if away > max(near, ELSEWHERE_M)}:
-        told = ", ".join(f"{name} by {away:.3g} m" for name, away in off.items())
+        shifts = ", ".join(f"{name} by {away:.3g} m" for name, away in off.items())
         yield (
-            f"robots do not start as in the scenario: {told}; if the log is in another frame, its distances to "
+            f"robots do not start as in the scenario: {shifts}; if the log is in another frame, its distances to "
             "obstacles are meaningless"
         )
 
 
 def source(name: str, tracks: Tracks) -> str:
     track = tracks.bodies[name]
-    frame = f" in frame {track.told['frame']}" if track.told.get("frame") else ""
-    clock = f", by {track.told['clock']}" if track.told.get("clock") else ""
+    frame = f" in frame {track.origin['frame']}" if track.origin.get("frame") else ""
+    clock = f", by {track.origin['clock']}" if track.origin.get("clock") else ""
     lasts = float(track.t_s[-1] - track.t_s[0])
     rate = f", {(len(track.t_s) - 1) / lasts:.3g} per second" if lasts else ""
-    return f"{len(track.t_s)} positions{rate}, of {track.told.get('stream', name)}{frame}{clock}"
+    return f"{len(track.t_s)} positions{rate}, of {track.origin.get('stream', name)}{frame}{clock}"
 
 
 def not_judged(judged: Judged) -> Iterator[str]:
@@ -128,13 +128,13 @@ def lines(judged: Judged, tracks: Tracks) -> Iterator[str]:
     yield from (f"{name}: {source(name, tracks)}" for name in tracks.bodies)
     if tracks.origin:
         yield f"Time 0 is {tracks.origin}."
-    told = [*tracks.said, *remarks(judged)]
-    yield from (f"Note: {remark}" for remark in told[:MOST_SAID])
-    if len(told) > MOST_SAID:
-        yield f"Note: {len(told) - MOST_SAID} more; --json has all"
+    notes = [*tracks.remarks, *remarks(judged)]
+    yield from (f"Note: {remark}" for remark in notes[:MOST_NOTES])
+    if len(notes) > MOST_NOTES:
+        yield f"Note: {len(notes) - MOST_NOTES} more; --json has all"
     if tracks.ignored:
-        more = f"; and {len(tracks.ignored) - MOST_SAID} more" if len(tracks.ignored) > MOST_SAID else ""
-        yield f"Not used: {'; '.join(tracks.ignored[:MOST_SAID])}{more}"
+        more = f"; and {len(tracks.ignored) - MOST_NOTES} more" if len(tracks.ignored) > MOST_NOTES else ""
+        yield f"Not used: {'; '.join(tracks.ignored[:MOST_NOTES])}{more}"
     yield "Least margins first, distances between surfaces:"
     for pair in judged.pairs[:MOST_PAIRS]:
         part = f"; covered {pair.covered_s:.6g} s" if pair.gaps_s else ""

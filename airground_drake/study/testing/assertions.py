@@ -8,7 +8,7 @@ from airground_drake.base.files import strict
 from airground_drake.base.statuses import PASSING
 from airground_drake.report.attention import in_words, place_of
 from airground_drake.report.model import Claim
-from airground_drake.report.sentences import told as value_of
+from airground_drake.report.sentences import as_text as value_of
 from airground_drake.scenario.load import Overrides, load, validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
@@ -100,12 +100,12 @@ def _require(verdicts: Iterable[Verdict], place: str, *, exercised: bool) -> Non
         if not passed or (exercised and not verdict.exercised):
             failed.append(verdict)
         elif verdict.exercised == 0:
-            warnings.warn(NotExercisedWarning(told(verdict, place).partition("\n")[0]), stacklevel=3)
+            warnings.warn(NotExercisedWarning(message_of(verdict, place).partition("\n")[0]), stacklevel=3)
     if failed:
-        raise ClaimError("\n".join(told(verdict, place) for verdict in failed), failed)
+        raise ClaimError("\n".join(message_of(verdict, place) for verdict in failed), failed)
 
 
-def told(verdict: Verdict, place: str) -> str:
+def message_of(verdict: Verdict, place: str) -> str:
     """A verdict in several lines: claim, result, bodies, time, and evidence."""
     of = verdict.claim
     claim = Claim.model_construct(exercised_by=of.exercised_by, **strict(Finding.to_json(verdict)))

@@ -76,8 +76,8 @@ class GuestPolicy(Policy):
             what = str(error) if isinstance(error, PolicyError | PluginError) else "its process sent no proposal"
             after = "; not asked again in this run" if self._used >= LIVES else ""
             raise PolicyError(what + after) from None
-        told = answer.get("traceback")
-        raise PolicyError(_words(answer["fault"]), printable(told) if isinstance(told, str) else "")
+        traceback = answer.get("traceback")
+        raise PolicyError(_words(answer["fault"]), printable(traceback) if isinstance(traceback, str) else "")
 
     def close(self) -> None:
         """End the process and its process group. A later question belongs to a new run."""

@@ -1,6 +1,6 @@
 """Checks that every route does before and after its own search."""
 
-from collections.abc import Callable
+import abc
 
 from airground_drake.base.arrays import Array
 from airground_drake.ugv.budget import Budget
@@ -8,20 +8,22 @@ from airground_drake.ugv.problem import Problem
 from airground_drake.ugv.relaxation import unavoidable_cost
 from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cut_short
 
-# A route's own work on a finite problem, with its constant plans, while there is budget left.
-Search = Callable[[Problem, ConstantPlans, Budget], Solution]
 
+class Guarded(abc.ABC):
+    """A route that searches unless numbers are not finite, or the budget is spent once constant plans are known."""
 
-def guarded(problem: Problem, budget: Budget, search: Search) -> Solution:
-    """Search, unless the problem or its costs are not finite, or the budget is spent once constant plans are known."""
-    if not problem.is_finite():
-        return Solution(False, "refused_not_finite")
-    constants = ConstantPlans.of(problem)
-    if not constants.are_finite():
-        return Solution(False, "refused_not_finite")
-    if budget.spent():
-        return cut_short(problem, constants.both, unavoidable_cost(problem))
-    return search(problem, constants, budget)
+    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+        if not problem.is_finite():
+            return Solution(False, "refused_not_finite")
+        constants = ConstantPlans.of(problem)
+        if not constants.are_finite():
+            return Solution(False, "refused_not_finite")
+        if budget.spent():
+            return cut_short(problem, constants.both, unavoidable_cost(problem))
+        return self._solve(problem, constants, budget)
+
+    @abc.abstractmethod
+    def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution: ...
 
 
 def without_optimum(

@@ -14,7 +14,7 @@ from airground_drake.ugv.drake_solvers import Minimiser, relax
 from airground_drake.ugv.plan_search import cheap_plan, distinct, improve
 from airground_drake.ugv.problem import Evaluation, Problem
 from airground_drake.ugv.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
-from airground_drake.ugv.routes.guard import guarded
+from airground_drake.ugv.routes.guard import Guarded
 from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cheapest
 
 _AGREE = 1e-6  # costs that differ by less than this, relative, are equal: the solver's tolerances and ours
@@ -34,7 +34,7 @@ class _Proof:
     optimum: Evaluation | None = None  # the plan; None without one
 
 
-class MixedIntegerRoute:
+class MixedIntegerRoute(Guarded):
     """Mixed-integer quadratic programs with one binary per stage, or per block of stages, and a proof of optimality.
 
     With half-planes for the exact distances, (26) is convex but for its binary variables. A solver finds the optimum
@@ -55,15 +55,11 @@ class MixedIntegerRoute:
     """
 
     def __init__(self, blocks: int | None = None, solver: str = "daqp") -> None:
-        """Choose blocks and solver."""
         # blocks: binaries, each for a block of stages; they need not divide the stages. None: one per stage.
         if blocks is not None and blocks < 1:
             raise ValueError(f"blocks: {blocks}, allowed: 1 or more")
         self._blocks = blocks
         self._search, self._programs = Minimiser(solver), Programs()
-
-    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
-        return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         binary = self._programs.of(problem.stages, min(self._blocks or problem.stages, problem.stages))

@@ -10,7 +10,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.ugv.budget import Budget
 from airground_drake.ugv.problem import Evaluation, Problem
 from airground_drake.ugv.relaxation import sum_up_rounding, unavoidable_cost, within_reach
-from airground_drake.ugv.routes.guard import guarded, without_optimum
+from airground_drake.ugv.routes.guard import Guarded, without_optimum
 from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cheapest, cut_short
 
 _AXES = 2  # UGVs move in their plane
@@ -20,7 +20,7 @@ _OPTIONS = {"Major optimality tolerance": 1e-5, "Major feasibility tolerance": 1
 _LIMITS = {"Major iterations limit": 1, "Iterations limit": 100}
 
 
-class NonlinearRoute:
+class NonlinearRoute(Guarded):
     """Relax, solve to a local optimum by sequential quadratic programming, round.
 
     Positions are variables, and the dynamics (23) are constraints between the stages.
@@ -48,9 +48,6 @@ class NonlinearRoute:
     def __init__(self) -> None:
         """Take SNOPT, which comes with Drake and needs no licence."""
         self._solver = SnoptSolver()
-
-    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
-        return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         relaxed, status = self.relax(problem, constants.better, budget)

@@ -10,13 +10,13 @@ from airground_drake.ugv.budget import Budget
 from airground_drake.ugv.drake_solvers import relax
 from airground_drake.ugv.problem import Problem
 from airground_drake.ugv.relaxation import dual_bound, normals_along, sum_up_rounding, unavoidable_cost
-from airground_drake.ugv.routes.guard import guarded, without_optimum
+from airground_drake.ugv.routes.guard import Guarded, without_optimum
 from airground_drake.ugv.solution import ConstantPlans, Solution, cheapest
 
 ACTIVE_SETS = 100  # active sets that DAQP may try for each iteration of the budget: they are as quick as that
 
 
-class RelaxedRoute:
+class RelaxedRoute(Guarded):
     """Relax, solve, round; every solution carries its optimality gap.
 
     Half-planes along the better of the two constant plans stand for (26d). Half-planes along the best plan found, and
@@ -33,9 +33,6 @@ class RelaxedRoute:
 
     def __init__(self) -> None:
         self._programs = Programs()
-
-    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
-        return guarded(problem, budget, self._solve)
 
     def _solve(self, problem: Problem, constants: ConstantPlans, budget: Budget) -> Solution:
         normals = normals_along(problem, constants.better.positions)

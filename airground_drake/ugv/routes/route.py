@@ -15,7 +15,7 @@ class Route(Protocol):
     may be repeated: nothing that it keeps between calls may change a solution. The contract:
 
     - It never raises, whatever the problem. For data that are not finite, and costs that overflow, it returns
-      `Solution(False, "refused_not_finite")`, as `guard.guarded` does.
+      `Solution(False, "refused_not_finite")`, as `guard.Guarded` does.
     - It does not write into the problem, whose arrays are read-only.
     - If its solver fails, it returns the best plan that it has evaluated, with status 'solver_failed'. The gatekeeper
       compares that with the previous plan, and with the constant plans (`solution.after_failure`).

@@ -224,9 +224,9 @@ def _against(trace: Trace, first: dict[str, Any], broken: Sequence[dict[str, Any
     if first["hypothesis"] != DECLARED:
         return against
     declared = trace.scenario.barriers[first["other"]].expected_speed_m_s
-    told = f"{first['other']} moved at {declared - first['margin']:.2f} m/s at {first['t_s']:.2f} s"
+    speeds = f"{first['other']} moved at {declared - first['margin']:.2f} m/s at {first['t_s']:.2f} s"
     more = sorted({str(entry["hypothesis"]) for entry in broken} - {DECLARED})
-    return against | {"why": f"{told}, declared {declared:.2f}", "also_broken": more}
+    return against | {"why": f"{speeds}, declared {declared:.2f}", "also_broken": more}
 
 
 def _worst(hypotheses: Sequence[_Hypothesis]) -> list[dict[str, Any]]:

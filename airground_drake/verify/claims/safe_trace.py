@@ -81,7 +81,7 @@ class SafeTrace(TraceClaim):
         both = (worst.first, worst.second)
         against: dict[str, Any] | None = None
         if not safe:
-            why = next(encounter.told(trace) for encounter in encounters(trace) if encounter[:2] == both)
+            why = next(encounter.cause(trace) for encounter in encounters(trace) if encounter[:2] == both)
             against = asdict(worst) | _place(trace, worst) | {"why": why} | snapshot(trace, both, worst.t_s)
         return Finding(
             "holds" if safe else "refuted",
@@ -118,7 +118,6 @@ class Distance:
 
 @per_trace
 def _entry(trace: Trace, k: int) -> Distance:
-    """The closest approach of the k-th pair."""
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
     near = margin_m < pair.reach_m or (pair.more_m > 0.0 and steered_margin(trace, pair) < pair.reach_m)
     return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, near)

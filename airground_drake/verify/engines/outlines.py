@@ -74,7 +74,6 @@ class Cores:
         )
 
     def take(self, rows: Any) -> Cores:
-        """Selected cores, by an array index."""
         return Cores(self.corners[rows], self.base[rows], self.top[rows])
 
     @property

@@ -38,10 +38,10 @@ def version() -> str:
     for tool in ("coqc", "coqchk"):
         if shutil.which(tool) is None:
             raise NoCoqError(f"{tool} is not on the PATH: install Coq (Debian, Ubuntu: apt-get install coq)")
-    said = _run(["coqc", "--print-version"], Path.cwd(), 60.0)
-    if said.returncode or not said.stdout.split():
-        raise NoCoqError(f"coqc does not run: {said.stderr.strip() or said.returncode}")
-    return said.stdout.split()[0]
+    run = _run(["coqc", "--print-version"], Path.cwd(), 60.0)
+    if run.returncode or not run.stdout.split():
+        raise NoCoqError(f"coqc does not run: {run.stderr.strip() or run.returncode}")
+    return run.stdout.split()[0]
 
 
 def screen(text: str, name: str) -> None:
@@ -76,13 +76,13 @@ def install(names: Iterable[str], folder: Path, source: Path = FOLDER, limit_s: 
 def compile_file(file: Path, limit_s: float = LIMIT_S) -> str:
     """Screen a file and compile it, in its folder; what it requires must be compiled there."""
     screen(file.read_text(encoding="utf-8"), file.name)
-    said = _run(["coqc", "-q", file.name], file.parent, limit_s)
-    if said.returncode:
-        where = re.search(r"line (\d+)", said.stderr)
-        why = " ".join(said.stderr.partition("Error:")[2].split()) or said.stderr or f"exit code {said.returncode}"
+    run = _run(["coqc", "-q", file.name], file.parent, limit_s)
+    if run.returncode:
+        where = re.search(r"line (\d+)", run.stderr)
+        why = " ".join(run.stderr.partition("Error:")[2].split()) or run.stderr or f"exit code {run.returncode}"
         line = int(where[1]) if where else 0
         raise CoqError(f"Coq does not accept {file.name}, line {line}: {why[:300]}", line)
-    return said.stdout
+    return run.stdout
 
 
 def axioms_of(theorems: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -> dict[str, list[str]]:
@@ -91,8 +91,8 @@ def axioms_of(theorems: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -
     lines = [f"Require {' '.join(modules)}.", *(f"Print Assumptions {theorem}." for theorem in theorems)]
     file = folder / "Assumptions_of_theorems.v"
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    said = compile_file(file, limit_s)
-    answers = re.split(r"^(?=Axioms:|Closed under)", said, flags=re.MULTILINE)[1:]
+    output = compile_file(file, limit_s)
+    answers = re.split(r"^(?=Axioms:|Closed under)", output, flags=re.MULTILINE)[1:]
     return {theorem: listed(theorem, answer) for theorem, answer in zip(theorems, answers, strict=True)}
 
 
@@ -109,10 +109,10 @@ def listed(theorem: str, answer: str) -> list[str]:
 
 def check_again(modules: Sequence[str], folder: Path, limit_s: float = LIMIT_S) -> None:
     """Have `coqchk` check compiled files and everything that they require."""
-    said = _run(["coqchk", "-silent", "-o", "-R", ".", "", *modules], folder, limit_s)
-    if said.returncode:
-        raise CoqError(f"coqchk does not accept the theories: {(said.stderr or said.stdout)[-300:]}")
-    summary = (said.stdout + said.stderr).partition("CONTEXT SUMMARY")[2]
+    run = _run(["coqchk", "-silent", "-o", "-R", ".", "", *modules], folder, limit_s)
+    if run.returncode:
+        raise CoqError(f"coqchk does not accept the theories: {(run.stderr or run.stdout)[-300:]}")
+    summary = (run.stdout + run.stderr).partition("CONTEXT SUMMARY")[2]
     parts = dict(re.findall(r"^\* ([^:]+):\s*(.*?)\s*(?=^\*|\Z)", summary, re.MULTILINE | re.DOTALL))
     axioms = parts.pop("Axioms", None)
     if axioms is None or parts.pop("Theory", "") != "Set is predicative" or len(parts) != 3:

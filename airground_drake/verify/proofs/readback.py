@@ -75,8 +75,8 @@ def compare_positions(text: str, trace: Trace, *, steered: bool = False) -> tupl
         raise ReadbackError(f"{run}: the bodies are not numbered in their order")
     off = list[Fraction]()
     for body, places in zip(bodies, recorded.values(), strict=True):
-        said = _coordinates(body, text, len(trace.t), int(unit, 0), len(places))
-        off += [abs(number - Fraction(axis)) for number, axis in zip(said, chain(*places), strict=True)]
+        values = _coordinates(body, text, len(trace.t), int(unit, 0), len(places))
+        off += [abs(number - Fraction(axis)) for number, axis in zip(values, chain(*places), strict=True)]
     spelled = dict(zip(recorded, bodies, strict=True))
     asked = demands(trace.scenario)
     for name, core in dict.fromkeys((demand.second, demand.core) for demand in asked if demand.core):
@@ -107,10 +107,10 @@ def _coordinates(body: str, text: str, rows: int, unit: int, places: int) -> lis
 def _off_corners(sets: str, text: str, unit: int, parts: Sequence[Sequence[Sequence[float]]]) -> list[Fraction]:
     """Differences of the corners of convex sets between the file and the scenario, m."""
     [what] = _parts(rf"^Definition {sets} := \[\n(.*?)\]\.$", text)
-    said = [_points(part, unit) for part in what.split(";\n")]
-    if [len(part) for part in said] != [len(part) for part in parts]:
+    read = [_points(part, unit) for part in what.split(";\n")]
+    if [len(part) for part in read] != [len(part) for part in parts]:
         raise ReadbackError(f"{sets}: the sets in the file have other corners than the shape in the scenario")
-    pairs = zip(chain(*chain(*said)), chain(*chain(*parts)), strict=True)
+    pairs = zip(chain(*chain(*read)), chain(*chain(*parts)), strict=True)
     return [abs(number - Fraction(axis)) for number, axis in pairs]
 
 

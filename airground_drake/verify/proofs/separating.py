@@ -33,7 +33,6 @@ class Prism(NamedTuple):
 
     @property
     def corners(self) -> list[Vector]:
-        """The corners of the convex hull."""
         return [(x, y, z) for z in self.levels for x, y in self.outline]
 
     @property

@@ -149,7 +149,7 @@ class Encounter(NamedTuple):
     blocked_by: tuple[str, ...] = ()  # the bodies whose inequalities kept it from retreating
     caught_s: tuple[float, ...] = ()  # first and last time without a pause in which they did; () if never
 
-    def told(self, trace: Trace) -> str:
+    def cause(self, trace: Trace) -> str:
         """The cause, as a sentence without a full stop."""
         if self.doing == "under way":
             drove = f"{self.first} drove {self.under_way_m:.2f} m on by commands under way"
@@ -158,10 +158,10 @@ class Encounter(NamedTuple):
             return f"{self.first} moved to {self.gap_m:.2f} m from {self.second}"
         if self.doing == "nobody" and self.appeared:
             t_s = trace.t[trace.there_from(self.second)]
-            told = f"{self.second} appeared at {t_s:.9g} s too near to {self.first}: not caused by motion"
+            appeared = f"{self.second} appeared at {t_s:.9g} s too near to {self.first}: not caused by motion"
             if not self.under_way_m:
-                return told
-            return f"{told}; {self.first} drove {self.under_way_m:.2f} m on by commands under way"
+                return appeared
+            return f"{appeared}; {self.first} drove {self.under_way_m:.2f} m on by commands under way"
         if self.doing == "nobody":
             return f"{self.first} starts {self.gap_m:.2f} m from {self.second}: not caused by motion"
         speed = f", {self.speed_m_s:.2f} m/s" if self.reaction.startswith("retreated") else ""

@@ -53,7 +53,6 @@ class DecisionRecord:
         return int(self.given["number"])
 
     def __getitem__(self, name: str) -> Array:
-        """A required array."""
         array = self.data[name]
         if array is None:
             raise TraceError(f"{self.label}: the problem has no {name!r}")
@@ -155,12 +154,10 @@ def rows_of(trace: Trace) -> list[DecisionRecord]:
 
 
 def reasons_of(trace: Trace) -> dict[str, int]:
-    """How many decisions were made for each reason."""
     return {str(reason): int(count) for reason, count in trace.decisions["reason"].value_counts().items()}
 
 
 def _solved(trace: Trace, given: dict[str, Any], problem: dict[Any, Any]) -> DecisionRecord:
-    """A decision with its problem, a row of `Trace.problems`."""
     gate = trace.scenario.gatekeeper
     scalars = [float(problem[name]) for name in PROBLEM_SCALARS]
     dt, error, slack, terminal = scalars

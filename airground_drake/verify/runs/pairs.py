@@ -143,7 +143,6 @@ def pairs_by(
 
 @per_trace
 def bounds_of(trace: Trace) -> dict[str, Bounds]:
-    """Bounds of the robots' bodies, by name."""
     robots = trace.scenario.robots
     return {
         name: trace.plant(name).bounds(robots[name].max_speed_m_s)._replace(**trace.scenario.seen(name))
@@ -171,7 +170,6 @@ def parts_of(trace: Trace) -> Parts:
 
 @per_trace
 def cores_of(trace: Trace) -> dict[str, Cores]:
-    """The cores of each barrier's convex parts, by name."""
     cores = dict[str, Cores]()
     for name, barrier in trace.scenario.barriers.items():
         parts, place = convex_parts(barrier), np.array([barrier.position_m or [0.0, 0.0, 0.0]], dtype=np.float64)

@@ -23,7 +23,6 @@ AT_LIMIT_M_S = 1e-6  # a speed this near to the limit is at the limit, m/s
 
 
 def passive_pairs(trace: Trace) -> list[Pair]:
-    """The pairs of a robot and an obstacle that may move."""
     return [pair for pair in pairs_of(trace) if pair.speed_m_s > 0.0]
 
 

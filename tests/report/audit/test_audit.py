@@ -12,7 +12,7 @@ import pytest
 
 from airground_drake.model.trigger import bayes
 from airground_drake.report.audit import companions, formulas, literal, thresholds
-from airground_drake.report.audit.item import typeset
+from airground_drake.report.audit.item import CONVERSION
 from airground_drake.scenario.load import load
 from airground_drake.ugv.solution import ConstantPlans
 from airground_drake.verify import Finding, cache_folder, judge_model
@@ -108,8 +108,7 @@ def test_page_and_article_mark_the_same_findings_as_possible_faults_of_the_conve
     article = (DOCS / "paper.md").read_text(encoding="utf-8")
     sections = re.split(r"^### (\d+)\. ", article, flags=re.MULTILINE)
     marked = [number for number in range(1, FINDINGS + 1) if "*(conversion?)*" in sections[2 * number]]
-    blank = [{"id": number} for number in range(1, FINDINGS + 1)]
-    assert [item["id"] for item in typeset(blank) if item["conversion"]] == marked
+    assert [*CONVERSION] == marked
     assert f"could explain findings {', '.join(map(str, marked[:-1]))} and {marked[-1]}" in article
 
 

@@ -13,7 +13,7 @@ from airground_drake.base.errors import UnknownNameError
 from airground_drake.commands.campaign import _code, _summary
 from airground_drake.study.campaign.conduct import Stopping
 from airground_drake.study.campaign.evidence import evidence
-from airground_drake.study.campaign.page import page, told
+from airground_drake.study.campaign.page import lines_of, page
 from airground_drake.study.campaign.rows import (
     COLUMNS,
     INVALID,
@@ -164,7 +164,7 @@ def test_the_page_says_first_what_was_found_and_what_separates_failures() -> Non
     rows += [row(i, run="b", drawn={}) for i in range(80)]
     rows[1]["what"] = "announced position, ugv1 at 1.05 s"
     found = conclude(rows) | {"name": "<b>"}
-    says = [tuple(line) for line in told(found)]
+    says = [tuple(line) for line in lines_of(found)]
     assert [mark for mark, _ in says] == ["no", "yes"]
     first = "; broken first: announced position (1); probability 0.1"
     assert says[0][1].startswith(f"SAFE-TRACE in run d: refuted in 20 of 80 runs{first}")

@@ -60,7 +60,7 @@ def test_nothing_is_claimed_in_a_gap(mark: str | None, tmp_path: Path, document:
     text = "\n".join(lines(judged, found))
     assert "Every distance was kept" not in text
     assert "tb_0, tb_1 are not covered from 2.400 to 3.600 s" in text
-    assert any("tb_1: 23 rows skipped" in said for said in found.said) == (mark is not None)
+    assert any("tb_1: 23 rows skipped" in said for said in found.remarks) == (mark is not None)
 
 
 def test_where_a_body_leaps_nothing_is_claimed(tmp_path: Path, document: dict[str, Any]) -> None:
@@ -72,7 +72,7 @@ def test_where_a_body_leaps_nothing_is_claimed(tmp_path: Path, document: dict[st
     judged = judge(found, document)
     assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(3.55), pytest.approx(3.6))]
     assert not judged.covers_all
-    assert any("tb_1: 1 steps that are more than 5 times faster than 1 m/s" in said for said in found.said)
+    assert any("tb_1: 1 steps that are more than 5 times faster than 1 m/s" in said for said in found.remarks)
 
 
 def test_two_recordings_of_one_time_are_refused(tmp_path: Path, document: dict[str, Any]) -> None:
@@ -93,7 +93,7 @@ def test_a_robot_that_stands_at_the_origin_at_first_is_there(tmp_path: Path) -> 
     there[t_s <= 2.0] = 0.0  # and then it leaps
     found = logs.read(written(tmp_path, logs.long({**FULL, "tb_1": (t_s, there)})), document)
     assert len(found.bodies["tb_1"].t_s) == len(t_s)
-    assert not any("lost" in said for said in found.said)
+    assert not any("lost" in said for said in found.remarks)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_stamps_of_headers_count_in_every_form(form: str, tmp_path: Path, docume
     found = logs.read(tmp_path / "run.mcap", document)
     least_m, _ = logs.least_gaps(FULL)[BROKEN]
     assert pair_of(judge(found, document).pairs, *BROKEN).least_m == pytest.approx(least_m, abs=1e-6)
-    assert {each.told["clock"] for each in found.bodies.values()} == {"header stamps"}
+    assert {each.origin["clock"] for each in found.bodies.values()} == {"header stamps"}
 
 
 def test_odometry_of_one_robot_beside_positions_without_a_frame_is_refused(
@@ -220,7 +220,7 @@ def test_of_two_rows_of_one_time_the_first_counts_and_the_contradiction_is_named
     found = logs.read(written(tmp_path, [head, *rows[: k + 1], other, *rows[k + 1 :]]), document)
     assert pair_of(judge(found, document).pairs, *BROKEN).least_m == pytest.approx(logs.least_gaps(FULL)[BROKEN][0])
     told = "tb_1: 1 row not where an earlier one of the same time is, at 3 s by 0.5 m; the earlier one counts"
-    assert told in found.said
+    assert told in found.remarks
 
 
 # --- names and frames ------------------------------------------------------------------------------------------------

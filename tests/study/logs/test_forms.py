@@ -499,7 +499,7 @@ def test_every_form_gets_the_verdict_of_its_numbers(name: str, tmp_path: Path, d
             shift_s = min(t_s[0] for t_s, _ in form.motion.values()) if found.origin else 0.0
             assert pair.at_s == pytest.approx(at_s - shift_s, abs=1e-5)
     assert [(pair.first, pair.second) for pair in judged.pairs if pair.status != KEPT] == [BROKEN]
-    assert [wanted for wanted in form.says if not any(wanted in each for each in found.said)] == []
+    assert [wanted for wanted in form.says if not any(wanted in each for each in found.remarks)] == []
 
 
 def test_these_numbers_would_be_kept_if_receipt_counted_or_a_unit_were_missed() -> None:

@@ -35,7 +35,7 @@ def written(
 def least_m(path: Path, scenario: dict[str, Any], **choice: Any) -> tuple[float, list[str]]:
     found = logs.read(path, scenario, **choice)
     pairs = {(pair.first, pair.second): pair for pair in judge(found, scenario).pairs}
-    return pairs[BROKEN].least_m, found.said
+    return pairs[BROKEN].least_m, found.remarks
 
 
 RIGHT_M = logs.least_gaps(FULL)[BROKEN][0]

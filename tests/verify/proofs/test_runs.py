@@ -4,8 +4,7 @@ import copy
 import json
 import math
 import re
-import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -25,10 +24,9 @@ from airground_drake.sim import trace
 from airground_drake.sim.trace import Trace
 from airground_drake.study.testing.plugin import Simulations
 from airground_drake.verify.claim import followed
-from airground_drake.verify.proofs import coq, export
+from airground_drake.verify.proofs import export
 from airground_drake.verify.proofs.export import demands, distances_file, recorded, without_vectors
 from airground_drake.verify.proofs.readback import ReadbackError, compare
-from airground_drake.verify.proofs.record import closure
 from airground_drake.verify.proofs.runs import Workshop, broken_rules, expects_kept, prove
 from airground_drake.verify.proofs.table import too_near
 
@@ -38,7 +36,7 @@ REFUSED = f"Coq refuses {UGV} and {ROCK}, 2 m"
 
 @pytest.mark.slow
 def test_case_a_keeps_its_distances_and_obeys_the_law(run: Simulations, workshop: Workshop) -> None:
-    """CI proves run d."""
+    """CI proves run d of case B."""
     distances, law, rounded = prove(workshop, run("case_a", "c"))
     assert (distances.proved, distances.why) == (True, "")
     assert (law.proved, law.why) == (True, "")
@@ -54,27 +52,30 @@ def moved(of: Trace, row: int, place: Array) -> Trace:
     return replace(of, states=table)
 
 
-def near_the_rock(of: Trace) -> tuple[int, Array, Array]:
-    """The row in which UGV1 is nearest to an obstacle, and the vectors from there to it and back, m."""
+NEAREST = 10
+"""A row of the trace that follows."""
+
+
+def near_the_rock(of: Trace) -> tuple[Trace, Array, Array]:
+    """The rows about the one in which UGV1 is nearest to an obstacle, its position, and the way from there, m."""
     rock = np.array(of.scenario.obstacles[ROCK].position_m)
     offsets = of.position(UGV) - rock
     row = int(np.argmin(np.linalg.norm(offsets, axis=1)))
-    return row, rock, offsets[row]
+    return short(of, 2 * NEAREST, row - NEAREST), rock, offsets[row]
 
 
 @pytest.mark.slow
 def test_a_step_through_an_obstacle_is_refused_though_both_of_its_ends_keep_the_distance(
     run: Simulations, workshop: Workshop
 ) -> None:
-    whole = run("case_a", "d")
-    row, rock, offset = near_the_rock(whole)
-    through = moved(whole, row, rock - 1.1 * offset)
+    few, rock, offset = near_the_rock(run("case_a", "d"))
+    through = moved(few, NEAREST, rock - 1.1 * offset)
     assert np.linalg.norm(through.position(UGV) - rock, axis=1).min() >= 2.0
     distances, law, _ = prove(workshop, through)
     assert distances.why.startswith(f"{REFUSED}. In exact arithmetic ")
     assert not law.proved
     gaps = {gap.demand.lemma: gap for gap in law.missed}
-    assert gaps[f"{UGV}_and_{ROCK}"].begin_s == whole.t[row - 1]
+    assert gaps[f"{UGV}_and_{ROCK}"].begin_s == few.t[NEAREST - 1]
     said = (workshop.folder / law.file).read_text(encoding="utf-8")
     assert said.count("\nEntry ") == law.entries >= 12
 
@@ -84,10 +85,9 @@ def test_a_step_through_an_obstacle_is_refused_though_both_of_its_ends_keep_the_
 def test_some_rounding_errors_short_is_too_short(
     short_m: float, kept: bool, run: Simulations, workshop: Workshop
 ) -> None:
-    whole = run("case_a", "d")
-    row, rock, offset = near_the_rock(whole)
+    few, rock, offset = near_the_rock(run("case_a", "d"))
     place = rock + offset * ((2.0 - short_m) / np.linalg.norm(offset))
-    distances, law, _ = prove(workshop, moved(whole, row, place))
+    distances, law, _ = prove(workshop, moved(few, NEAREST, place))
     assert distances.proved is kept
     assert [(one.demand.lemma, round(one.short_m, 15)) for one in distances.too_near] == (
         [] if kept else [(f"{UGV}_and_{ROCK}", pytest.approx(short_m, abs=2e-15))]
@@ -110,8 +110,8 @@ def test_every_pair_that_comes_too_near_is_named_with_its_distance_and_time(run:
     assert too_near(recorded(few)) == []
 
 
-def short(of: Trace, rows: int = 5) -> Trace:
-    return replace(of, states=of.states.iloc[:rows].reset_index(drop=True))
+def short(of: Trace, rows: int = 5, first: int = 0) -> Trace:
+    return replace(of, states=of.states.iloc[first : first + rows].reset_index(drop=True))
 
 
 WALLS: dict[str, dict[str, Any]] = {
@@ -252,17 +252,6 @@ def test_a_scenario_says_which_runs_are_to_keep_their_distances(run: Simulations
     of = run("case_a", "d")
     for expected, kept in (("holds", True), ("exercised", True), ("holds or refuted", False)):
         assert expects_kept(with_scenario(of, runs__d__expected={"SAFE-TRACE": expected})) is kept
-
-
-@pytest.fixture
-def compiled_before(compiled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The command takes the theories that the session has compiled."""
-
-    def install(names: Iterable[str], folder: Path, limit_s: float) -> list[str]:
-        shutil.copytree(compiled, folder, dirs_exist_ok=True)
-        return closure(names)
-
-    monkeypatch.setattr(coq, "install", install)
 
 
 @pytest.fixture
