@@ -114,8 +114,8 @@ class SafeHyp(TraceClaim):
         "h or more. The controllers had the scenario's parameters; a controller of the user's own is judged by "
         "its steps alone. If robots act on measured positions, the inequalities are about measured positions "
         "(beside an obstacle that may move, about true or measured ones; of two robots that measure each other, about "
-        "those of one of them), the errors were within their bound, and d is about true bodies. If messages between UGVs may be lost, a UGV stood unless it knew that the "
-        "senders of missing messages were far. If UGVs act on old positions (`control.law: asynchronous`), each "
+        "those of one of them), the errors were within their bound, and d is about true bodies. If messages between "
+        "UGVs may be lost, a UGV stood unless it knew that the senders of missing messages were far. If UGVs act on old positions (`control.law: asynchronous`), each "
         "step avoided all points that the other could reach before it decided again, up to e, and the two kept d "
         "minus the sum of all e."
     )
