@@ -567,9 +567,6 @@ def _measured(scenario: Scenario) -> Problems:
     key, control = "sensing.position_error_m", scenario.control
     if scenario.own_views and scenario.ugv_links is not None:
         yield "sensing.shared", False, "true with channel.ugvs, which carries the positions that UGVs publish"
-    if scenario.own_views and len(scenario.aerial) > 1 and not scenario.safe_distance.uav_m:
-        why = "above 0 with sensing.shared: false: UAVs that measure each other in two directions"
-        yield "safe_distance.uav_m", 0.0, why
     for run, spec in scenario.runs.items():
         if spec.composition != "augmented":
             yield f"runs.{run}.composition", spec.composition, f"augmented: with {key} robots may have to stand still"

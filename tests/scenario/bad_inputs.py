@@ -317,7 +317,6 @@ TOGETHER = [
             ["sensing.shared=false", "ugvs.ugv2.start_m=[-6, 1.2, 0]"],
         )
     ),
-    ("two_uavs", [*ERRORS, "sensing.shared=false", "safe_distance.uav_m=0"]),
 ]
 """A shipped scenario, and several `--set` that do not go together."""
 
