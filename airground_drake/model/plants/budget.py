@@ -47,7 +47,7 @@ class Bounds(NamedTuple):
     # Whether the body is drawn after the steered point, as a trailer: then beside a set at rest a cover l costs
     # sqrt(d^2 + l^2) - d (theorem Plants.forwards).
     drawn: bool = False
-    # Error bound of the steered point's measured position; both robots of a pair use the same measured positions.
+    # Error bound of the measured position of the steered point.
     error_m: float = 0.0
     may_stand: bool = False  # whether the robot may stand because it misses another one's position
     own_views: bool = False  # whether the robot acts on its own measurements of other robots
