@@ -24,8 +24,8 @@ from airground_drake.model.geometry.paths import NoPath, shortest_path
 from airground_drake.report.metrics import outcome
 from airground_drake.scenario.imported import Sizes, barn
 from airground_drake.scenario.load import from_data
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.schema import Scenario
-from airground_drake.scenario.shapes import outlines_of
 from airground_drake.scenario.world import make_world
 from airground_drake.sim.simulation import simulate
 

@@ -221,7 +221,7 @@ def judged(number: int) -> Judged | None:
         scenario = from_data(draw(number), f"promises_{number}")
     except ScenarioError:
         return None
-    trace = simulate(scenario, "d")
+    trace = simulate(scenario, "d", engine="batch")
     (hypotheses,) = judge(trace, ["SAFE-HYP"])
     pairs = courses(trace, scenario.control.period_s)
     broken, tested = list[str](), Counter[str]()

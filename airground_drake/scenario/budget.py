@@ -5,9 +5,9 @@ from itertools import combinations
 from typing import NamedTuple
 
 from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance, least_gain
+from airground_drake.scenario.outlines import gap_m
 from airground_drake.scenario.plants import bounds_of, plant_of
 from airground_drake.scenario.schema import Scenario
-from airground_drake.scenario.shapes import gap_m
 
 # By term of a budget, the key that it comes from; a dip follows from several.
 KEYS = {

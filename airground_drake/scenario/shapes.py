@@ -1,4 +1,4 @@
-"""The convex parts of an obstacle: their corners in the world frame, and their outlines."""
+"""The convex parts of an obstacle: their corners in the world frame."""
 
 import math
 from collections.abc import Sequence
@@ -7,36 +7,14 @@ from itertools import pairwise
 import numpy as np
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.geometry.outline import SPEED, balls, prism, prisms, stacked
 from airground_drake.scenario.maps.grid import Frame
-from airground_drake.scenario.schema import MapCells, MapObstacle, Obstacle, Scenario
+from airground_drake.scenario.schema import MapCells, MapObstacle, Obstacle
 
 # Corners that are turned or moved are rounded to this many digits after the point, m: they are then the same on every
 # machine, and short as decimals.
 DIGITS = 12
 
 Corner = tuple[float, float]
-
-
-def outlines_of(scenario: Scenario, obstacle: Obstacle) -> Array:
-    """The outlines of an obstacle's convex parts, (k, W), with the distance that robots keep, m, and its speed, m/s."""
-    # They are in the world frame; those of an obstacle that moves are about the origin of its frame.
-    gap = gap_m(scenario, obstacle)
-    if isinstance(obstacle, MapObstacle):
-        return prisms(corners_of_map(obstacle.cells), top=obstacle.height_m, gap=gap)
-    parts = convex_parts(obstacle)
-    if parts is None:
-        rows = balls(obstacle.position_m or np.zeros(3), obstacle.radius_m, gap)
-    else:
-        rows = stacked(prism(part, top=obstacle.height_m, radius=obstacle.radius_m, gap=gap) for part in parts)
-    rows[:, SPEED] = obstacle.expected_speed_m_s
-    return rows
-
-
-def gap_m(scenario: Scenario, obstacle: Obstacle) -> float:
-    """The distance that robots keep from an obstacle's surface, m."""
-    safe = scenario.safe_distance
-    return obstacle.distance_m or (obstacle.expected_speed_m_s and safe.moving_m) or safe.obstacle_m
 
 
 def convex_parts(obstacle: Obstacle) -> list[list[Corner]] | None:

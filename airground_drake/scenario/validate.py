@@ -25,10 +25,11 @@ from airground_drake.model.plants.plant import Setting
 from airground_drake.model.trigger.bayes import threshold
 from airground_drake.scenario import hints
 from airground_drake.scenario.budget import PairBudget, budget, takes_room
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of, refusal
 from airground_drake.scenario.rounding import TOLERANCE_M, Rounding
 from airground_drake.scenario.schema import ABOUT, ARENA, MAP, SHAPES, Obstacle, Scenario, Vector
-from airground_drake.scenario.shapes import crossing, near_edge, outlines_of
+from airground_drake.scenario.shapes import crossing, near_edge
 
 GAINS = ("avoidance_gain_1_s", "motion_gain_1_s", "formation_gain_1_s", "intervention_gain_1_s")
 TOLERANCE = 1e-9  # m between points; relative between periods

@@ -9,10 +9,10 @@ from airground_drake.model.bodies.world import Body, World
 from airground_drake.model.geometry import outline
 from airground_drake.model.plants.scripted import Scripted
 from airground_drake.scenario.courses import course
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.rounding import SPARE_S
 from airground_drake.scenario.schema import Obstacle, Scenario, Uav, Ugv
-from airground_drake.scenario.shapes import outlines_of
 
 
 def make_world(scenario: Scenario) -> World:

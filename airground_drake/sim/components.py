@@ -20,9 +20,9 @@ from airground_drake.model.trigger.bayes import threshold
 from airground_drake.scenario.budget import budget, takes_room
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.links import make_links
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import Decision, Scenario, Uav
-from airground_drake.scenario.shapes import outlines_of
 from airground_drake.scenario.world import make_world
 from airground_drake.uav.database import BehaviourDatabase, make_policy
 from airground_drake.uav.planner import Mover, Planner, Sender

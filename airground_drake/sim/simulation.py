@@ -244,9 +244,7 @@ def warm_up_beside() -> None:
     way_left(here, there, outline.balls(0.5 * there[None]), np.ones(1))
     ways = np.ones((2, 3))
     MixedIntegerRoute().solve(Problem(1.0, here, ways, -ways, ways, np.ones((2, 1, 3)), np.ones(1), 1.0, 1.0))
-    begun, now = np.zeros(6), np.ones(6)
-    begun.setflags(write=False)  # as a Context gives it
-    ranges(begun, now, Corners.of([Motion(np.array([0.0, 1.0]), ways)]))
+    ranges(np.zeros(6), np.ones(6), Corners.of([Motion(np.array([0.0, 1.0]), ways)]))
 
 
 def simulate(

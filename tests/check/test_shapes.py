@@ -20,8 +20,8 @@ from airground_drake.check.scenario import Pair, pairs_of
 from airground_drake.check.shapes import POINT, ROWS, Shape, boxes_of, shape_of, split
 from airground_drake.model.geometry import outline
 from airground_drake.scenario.load import from_data, load, resolved
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.schema import Obstacle
-from airground_drake.scenario.shapes import outlines_of
 
 Corners = list[list[float]]
 Array = NDArray[np.float64]

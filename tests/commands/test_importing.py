@@ -12,8 +12,8 @@ from commands.conftest import Airground
 
 from airground_drake.model.geometry import convex, outline
 from airground_drake.scenario.load import load
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.schema import Scenario
-from airground_drake.scenario.shapes import outlines_of
 
 MAPS = Path(__file__).parents[1] / "scenario" / "maps" / "data"
 PILLAR = (

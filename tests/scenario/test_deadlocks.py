@@ -8,8 +8,9 @@ from scenario.cases import DEADLOCKS
 from airground_drake.base.arrays import Array
 from airground_drake.model.geometry.outline import as_tuple
 from airground_drake.scenario.load import load
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.schema import Scenario
-from airground_drake.scenario.shapes import convex_parts, outlines_of
+from airground_drake.scenario.shapes import convex_parts
 from airground_drake.sim.components import make_map, positions
 
 ROOM_M = 0.1

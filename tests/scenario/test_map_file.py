@@ -16,8 +16,8 @@ from airground_drake.base.files import sha256
 from airground_drake.model.geometry import convex, outline
 from airground_drake.scenario import map_file
 from airground_drake.scenario.load import from_data, load, resolved, validated
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.schema import Scenario
-from airground_drake.scenario.shapes import outlines_of
 from airground_drake.scenario.world import make_world
 
 ROOM = """

@@ -103,12 +103,11 @@ def test_a_uav_that_is_lost_repeats_nothing_and_hears_nothing() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["b", "d"])
-def test_the_shipped_link_has_no_fault(run: Run, name: str) -> None:
+def test_over_the_shipped_link_messages_are_repeated_doubled_and_lost(run: Run, name: str) -> None:
     trace = run("noisy_link", name)
     assert trace.messages["attempt"].max() > 0
     assert trace.messages["copy"].max() == 1
     assert trace.messages["received_s"].isna().any()
-    assert not faults_of(trace)
 
 
 def test_of_messages_that_never_arrive_there_is_nothing_to_decide() -> None:

@@ -64,7 +64,7 @@ def test_a_uav_that_is_lost_or_has_no_policies_helps_nobody(run: Run, setting: s
 )
 def test_other_methods_forget_what_a_lost_uav_asked_at_its_end_too(method: str, lost_at_s: float) -> None:
     over = {"runs": {method: {"method": method}}, "uavs.south.lost_at_s": lost_at_s, "duration_s": 20.0}
-    trace = simulate(load("two_uavs", over), method)
+    trace = simulate(load("two_uavs", {**over, "gatekeeper.blocks": 6}), method)  # plans of few variables
     assert proposals_of(trace)
     assert not faults_of(trace)
 

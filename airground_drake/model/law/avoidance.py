@@ -113,7 +113,7 @@ class Avoidance:
     def apply(self, lower: Array, spaces: HalfSpaces) -> Array:
         """Put the avoidance tasks above lower-priority velocities: (n, 3) m/s to (n, 3) m/s."""
         rows = zip(lower, spaces.normal, spaces.bound, strict=True)
-        return np.array([kernels.avoid_one(*row, self.layer.composition) for row in rows])
+        return np.array([kernels.avoid_one(*row, self.layer.composition, np.inf) for row in rows])
 
     def command(self, lower: Array, positions: Array, near: Neighbours) -> Array:
         """Commands of k robots, (k, 3), m/s: lower-priority velocities (k, 3), limited in speed, below avoidance.

@@ -127,7 +127,7 @@ def _lead_away(
 
 
 @njit(cache=True)
-def avoid_one(lower: Array, normal: Array, bound: Array, composition: int, max_speed: float = np.inf) -> Array:
+def avoid_one(lower: Array, normal: Array, bound: Array, composition: int, max_speed: float) -> Array:
     """Velocity of one robot, (3,) m/s: the avoidance tasks above `lower`, composed by (5) or as `Avoidance` says.
 
     A non-finite `lower` counts as 0. With the composition `STANDING`, a robot also stands if only velocities above
@@ -182,7 +182,7 @@ def yielding(task: Array, normal: Array, retreat: Array, max_speed: float) -> Ar
     bound = np.empty(len(retreat))
     for k in range(len(retreat)):
         bound[k] = retreat[k] if retreat[k] > 0.0 else -np.inf
-    velocity = avoid_one(task, normal, bound, AUGMENTED)
+    velocity = avoid_one(task, normal, bound, AUGMENTED, np.inf)
     limit_one(velocity, max_speed)
     return velocity
 

@@ -9,9 +9,9 @@ from airground_drake.model.geometry import convex, outline
 from airground_drake.model.plants.plant import HEADING
 from airground_drake.model.trigger.automaton import Mode
 from airground_drake.report.view.geometry import outer_edges
+from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import ARENA, Scenario
-from airground_drake.scenario.shapes import outlines_of
 from airground_drake.sim.trace import Trace
 
 # A robot follows its own task, follows it while its trigger is set, or executes a proposal.

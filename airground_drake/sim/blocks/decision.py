@@ -150,7 +150,7 @@ class DecisionVariable(DecisionBlock):
 
     def _ranges(self, begun: Array, now: Array) -> Array:
         own = type(self).value is not DecisionVariable.value or type(self).extremes is not DecisionVariable.extremes
-        return super()._ranges(begun, now) if own else ranges(begun, now, self._corners)
+        return super()._ranges(begun, now) if own else ranges(begun.copy(), now, self._corners)
 
 
 class EventTrigger(LeafSystem):
@@ -242,18 +242,21 @@ class EventTrigger(LeafSystem):
         t = context.get_time()
         if t - context.get_discrete_state(1)[0] < SHORTEST_S:
             return 1.0
-        status, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
+        status, levels = self._copied(context)
         return -1.0 if anything_due(status, t, self._range.Eval(context), levels) else 1.0
+
+    def _copied(self, context: Context) -> tuple[Array, Array]:
+        """Status and levels, in arrays that can be written, as in the loop: functions are compiled for these alone."""
+        return context.get_discrete_state(0).value().copy(), context.get_numeric_parameter(0).value().copy()
 
     def update(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """The per-step update: make the transitions that became due in the step that ends, and begin another step."""
         t, spans = context.get_time(), self._range.Eval(context)
-        before, levels = context.get_discrete_state(0).value(), context.get_numeric_parameter(0).value()
+        status, levels = self._copied(context)
         if not are_numbers(spans):
             source = "from a decision block, a plant or a disturbance"
             raise PluginError(f"decision_range is not a number, {source}: {short(repr(spans.tolist()))}")
-        if anything_due(before, t, spans, levels):
-            status = before.copy()
+        if anything_due(status, t, spans, levels):
             advance(status, t, self._variable.Eval(context), spans, self._checked_levels(context))
             discrete.set_value(0, status)
             discrete.set_value(3, [0.0])

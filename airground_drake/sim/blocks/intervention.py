@@ -104,7 +104,7 @@ class InterventionPlanner(LeafSystem):
         return EventStatus.Succeeded()
 
     def _halts(self, context: Context) -> Array:
-        before = context.get_discrete_state(0).value()
+        before = context.get_discrete_state(0).value().copy()
         return watched(before, context.get_time(), self._bodies.Eval(context)[self._ugvs], self._room)
 
     def _update(self, context: Context, state: State) -> EventStatus:

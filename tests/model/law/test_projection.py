@@ -123,7 +123,7 @@ def test_normals_that_depend_on_each_other(seed: int, kind: str, planar: bool) -
 def test_a_robot_that_just_fits_between_two_walls_slides_along(by: float) -> None:
     normal, bound = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]), np.full(2, by)
     for aside in (-1e-17, 1e-17, 0.3, -0.3):
-        velocity = kernels.avoid_one(np.array([1.0, aside, 0.0]), normal, bound, kernels.AUGMENTED)
+        velocity = kernels.avoid_one(np.array([1.0, aside, 0.0]), normal, bound, kernels.AUGMENTED, np.inf)
         assert velocity == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
         assert (normal @ velocity >= np.minimum(bound, 0.0)).all()
 
@@ -135,7 +135,9 @@ def test_robots_in_contact_slide_along() -> None:
         angle = rng.uniform(0.0, 2.0 * np.pi)
         normal = np.array([[np.cos(angle), np.sin(angle), 0.0]])
         lower = 2.0 * (np.array([-normal[0, 1], normal[0, 0], 0.0]) - normal[0])
-        assert kernels.avoid_one(lower, normal, np.zeros(1), kernels.AUGMENTED) @ lower == pytest.approx(4.0, abs=1e-9)
+        assert kernels.avoid_one(lower, normal, np.zeros(1), kernels.AUGMENTED, np.inf) @ lower == pytest.approx(
+            4.0, abs=1e-9
+        )
 
 
 @pytest.mark.parametrize(("normal", "bound"), [((-4e-6, 0.0, 0.0), -20.0), ((1.0, 0.0, 0.0), -5.0)])
@@ -144,7 +146,7 @@ def test_exactly_below_the_uav_and_inside_its_safe_distance_a_ugv_stands(
 ) -> None:
     """No velocity on the ground helps: it does not run to where the bound of something else is, at 5000 km/s."""
     normals, bounds = np.array([[0.0, 0.0, 0.0], normal]), np.array([6.0, bound])
-    assert not kernels.avoid_one(np.array([1.0, 0.0, 0.0]), normals, bounds, kernels.AUGMENTED).any()
+    assert not kernels.avoid_one(np.array([1.0, 0.0, 0.0]), normals, bounds, kernels.AUGMENTED, np.inf).any()
 
 
 @pytest.mark.parametrize("apart", [1e-8, 1e-6, 1e-4])

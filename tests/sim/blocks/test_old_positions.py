@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from oracles import ORACLES, faults_of
+from properties import examples
 from sim.blocks.test_positions import ABOUT_D, APART_M, PERIOD_S, checked, forged, found, least_m, team
 
 from airground_drake.base.arrays import Array
@@ -62,7 +63,7 @@ def test_the_distance_is_kept_whatever_the_age_of_positions(
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@examples(30, fuzz=500)
 @given(
     seed=st.integers(0, 10**6), delay_s=st.floats(0.1, 0.5), loss=st.floats(0.0, 0.5),
     period_s=st.sampled_from([0.025, 0.05]),
@@ -155,7 +156,7 @@ def towards(x: float, y: float, unsure: float, task: Array) -> Array:
     return command
 
 
-@settings(max_examples=300, deadline=None)
+@examples(300)
 @given(
     at=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), unsure=st.floats(0.01, 2.0),
     task=st.tuples(st.floats(-1.4, 1.4), st.floats(-1.4, 1.4)),

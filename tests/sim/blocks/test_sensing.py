@@ -168,8 +168,10 @@ def test_without_the_key_nothing_is_written_of_it_and_the_loop_makes_the_run() -
 def test_a_robot_stands_where_inequalities_contradict_one_another() -> None:
     normal, bound = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), np.array([0.1, 0.1])
     wish = np.array([0.5, 0.5, 0.0])
-    assert not kernels.avoid_one(wish, normal, bound, kernels.STANDING).any()
-    assert kernels.avoid_one(wish, normal, bound - 0.2, kernels.STANDING).tolist() == pytest.approx([0.1, 0.5, 0.0])
+    assert not kernels.avoid_one(wish, normal, bound, kernels.STANDING, np.inf).any()
+    assert kernels.avoid_one(wish, normal, bound - 0.2, kernels.STANDING, np.inf).tolist() == pytest.approx(
+        [0.1, 0.5, 0.0]
+    )
 
 
 def test_a_robot_stands_where_inequalities_ask_for_more_than_its_speed_limit() -> None:
@@ -219,7 +221,7 @@ def orbited(error: float, gain_share: float, distance: float = 0.6, period: floa
         normal = np.array([[np.cos(turn), np.sin(turn), 0.0]])
         bound = share / period * (law - seen) if seen <= law else -(law - seen) / period
         wish = error / period * np.array([-normal[0, 1], normal[0, 0], 0.0])
-        step = period * kernels.avoid_one(wish, normal, np.array([bound]), kernels.STANDING)
+        step = period * kernels.avoid_one(wish, normal, np.array([bound]), kernels.STANDING, np.inf)
         along = float(np.clip(-(place @ step) / max(step @ step, 1e-12), 0.0, 1.0))
         nearest = min(nearest, float(np.linalg.norm(place + along * step)))
         place = place + step

@@ -4,6 +4,7 @@ import copy
 import json
 import math
 import re
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -27,11 +28,18 @@ from airground_drake.verify.claim import followed
 from airground_drake.verify.proofs import export
 from airground_drake.verify.proofs.export import demands, distances_file, recorded, without_vectors
 from airground_drake.verify.proofs.readback import ReadbackError, compare
+from airground_drake.verify.proofs.record import FOLDER, digest
 from airground_drake.verify.proofs.runs import Workshop, broken_rules, expects_kept, prove
 from airground_drake.verify.proofs.table import too_near
 
 UGV, ROCK = "ugv1", "obstacle_1"
 REFUSED = f"Coq refuses {UGV} and {ROCK}, 2 m"
+
+
+@pytest.fixture
+def workshop(compiled: Path, coq_version: str, tmp_path: Path) -> Workshop:
+    folder = shutil.copytree(compiled, tmp_path / "workshop")
+    return Workshop(folder, coq_version, {path.name: digest(FOLDER / path.name) for path in folder.glob("*.v")})
 
 
 @pytest.mark.slow
