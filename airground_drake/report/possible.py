@@ -5,13 +5,14 @@ so no run is simulated for this.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import permutations
 from typing import Any
 
 import numpy as np
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.registry import method_of
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.report.lines import Line, different
@@ -134,9 +135,10 @@ def _measured(trace: Trace, scenario: Scenario) -> Wrong:
         return
     true = np.stack([trace.position(body.name)[trace.sample_rows] for body in world.moving], axis=1)
     views = trace.robots if scenario.own_views else ()
+    measure: list[Callable[[float, Array], Array]] = [errors.published, errors.seen_by_uav]
+    measure += [partial(errors.view_of, robot) for robot in views]
     published, seen, *viewed = (
-        np.array([measured(t, places) for t, places in zip(t_s, true, strict=True)])
-        for measured in (errors.published, errors.seen_by_uav, *(partial(errors.view_of, robot) for robot in views))
+        np.array([measured(t, places) for t, places in zip(t_s, true, strict=True)]) for measured in measure
     )
     for i, ugv in enumerate(trace.ugvs if scenario.announces else ()):  # measured a period ago, and a step
         published[1:, i] = published[:-1, i] + scenario.control.period_s * trace.chosen(ugv)[:-1]
