@@ -18,6 +18,7 @@ from airground_drake.scenario.links import make_links
 from airground_drake.scenario.schema import Channel, Scenario
 from airground_drake.scenario.sensing import errors_of
 from airground_drake.scenario.world import make_world
+from airground_drake.sim.recording import unheard
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.channel import Message, Transit, lost
 from airground_drake.verify.claim import TIME_TOLERANCE_S as SAME_S
@@ -147,6 +148,8 @@ def _measured(trace: Trace, scenario: Scenario) -> Wrong:
 
 def _executed(trace: Trace, scenario: Scenario) -> Wrong:
     """A UGV executes what has arrived, and under a gatekeeper what that accepts, until news about it arrive."""
+    for ugv, t, number in unheard(trace):
+        yield f"number of the proposal that {ugv} executes", t, number, "one that has arrived"
     if scenario.ugv_controller is not None:
         return
     period_s, gated = scenario.gatekeeper.period_s, method_of(trace.meta["method"]).gated
@@ -163,5 +166,5 @@ def _executed(trace: Trace, scenario: Scenario) -> Wrong:
             due = said.get((ugv, int((t + SAME_S) / period_s)), -1) if gated else number
             news = {(about, kind) for at_s, about, kind in arrived if at_s <= t + SAME_S}
             over = number == -1 and any(about > due or (about, kind) == (due, "withdrawal") for about, kind in news)
-            if (number != due and not over) or (number >= 0 and (number, "proposal") not in news):
+            if number != due and not over:
                 yield f"number of the proposal that {ugv} executes", t, number, due

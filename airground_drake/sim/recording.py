@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from airground_drake.base.arrays import Array, Indices
+from airground_drake.base.errors import PluginError
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import outline
 from airground_drake.model.trigger.automaton import FIELDS
@@ -91,8 +92,22 @@ def trace_of(
     sent = carried(memories, done.carried, ugvs) if done.carried else messages(memories, trace)
     trace = replace(trace, messages=sent)
     trace.derived("scenario", lambda: given)  # it need not be read from the metadata
+    if given.ugv_controller is not None:
+        for ugv, t_s, number in unheard(trace):
+            said = f"controller {given.ugv_controller.kind!r} says that {ugv} executes {number} at t = {t_s:.9g} s"
+            raise PluginError(f"{said}; allowed: numbers of proposals that have arrived, -1 for none")
     meta["events"] = extract(trace)
     return trace
+
+
+def unheard(trace: Trace) -> Iterator[tuple[str, float, int]]:
+    """What UGVs execute although no such proposal has arrived: the UGV, the time, s, and the number."""
+    sent = trace.messages[trace.messages["kind"] == "proposal"].sort_values("received_s")
+    for ugv in trace.ugvs:
+        numbers, t_s = trace.samples[f"{ugv}.executing"], trace.samples["t_s"]
+        arrived_s = sent[sent["receiver"] == ugv].drop_duplicates("about").set_index("about")["received_s"]
+        early = (numbers >= 0) & ~(numbers.map(arrived_s) <= t_s + MERGE_S)
+        yield from ((ugv, float(t_s[k]), int(numbers[k])) for k in np.flatnonzero(early))
 
 
 def distinct(t: Array, command: Array) -> Indices:
