@@ -1,7 +1,11 @@
 """The links of a scenario's channel, between UAVs and their UGVs."""
 
-from airground_drake.scenario.schema import Channel, WayBack
+import math
+
+from airground_drake.scenario.schema import Channel, Scenario, WayBack
 from airground_drake.uav.channel import Link, Quality
+
+ANSWERING_S = 0.15  # time that an answer may take besides its way, s
 
 
 def make_qualities(channel: Channel) -> tuple[Quality, Quality]:
@@ -16,3 +20,14 @@ def make_links(channel: Channel) -> tuple[Link, Link]:
     """The links from the UAV to UGVs, and back."""
     down, up = make_qualities(channel)
     return Link(down, channel.seed, "down"), Link(up, channel.seed, "up")
+
+
+def repeats_after(scenario: Scenario) -> float:
+    """Time after which an unanswered message is repeated, s; infinite without a channel."""
+    if scenario.channel is None:
+        return math.inf
+    down, up = make_qualities(scenario.channel)
+    # so an answer in time is read a planning period before: then the planner asks whether a copy would come too late
+    samples = scenario.gatekeeper.period_s, scenario.control.period_s, scenario.intervention.period_s
+    answering = max(ANSWERING_S, sum(samples))
+    return down.delay_s + up.delay_s + max(down.jitter_s, up.jitter_s) + answering

@@ -16,7 +16,7 @@ from airground_drake.model.trigger.automaton import FIELDS
 from airground_drake.scenario.load import own, resolved
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.blocks.signals import Status
-from airground_drake.sim.events import extract
+from airground_drake.sim.events import extract, unheard
 from airground_drake.sim.tables import (
     DECISION_COLUMNS,
     DECISION_LISTS,
@@ -98,16 +98,6 @@ def trace_of(
             raise PluginError(f"{said}; allowed: numbers of proposals that have arrived, -1 for none")
     meta["events"] = extract(trace)
     return trace
-
-
-def unheard(trace: Trace) -> Iterator[tuple[str, float, int]]:
-    """What UGVs execute although no such proposal has arrived: the UGV, the time, s, and the number."""
-    sent = trace.messages[trace.messages["kind"] == "proposal"].sort_values("received_s")
-    for ugv in trace.ugvs:
-        numbers, t_s = trace.samples[f"{ugv}.executing"], trace.samples["t_s"]
-        arrived_s = sent[sent["receiver"] == ugv].drop_duplicates("about").set_index("about")["received_s"]
-        early = (numbers >= 0) & ~(numbers.map(arrived_s) <= t_s + MERGE_S)
-        yield from ((ugv, float(t_s[k]), int(numbers[k])) for k in np.flatnonzero(early))
 
 
 def distinct(t: Array, command: Array) -> Indices:
