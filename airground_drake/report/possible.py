@@ -57,7 +57,7 @@ def _proposed(trace: Trace, scenario: Scenario) -> Wrong:
     for number, robot, sender, t_s, cause, numbers in rows:
         party = [ugvs.get(k, k) for k in numbers]
         about, row = f"proposal {number}", int(np.searchsorted(trace.t, t_s - SAME_S))
-        if not {robot, cause, *party} <= charge.get(sender, set()) or (cause != robot and robot not in party):
+        if not {robot, cause, *party} <= charge.get(sender, set()):
             yield f"parties of {about}", t_s, [robot, cause, *party], "UGVs of its UAV"
         elif not (trace.column(f"{cause}.mode")[row : row + 2] == 1.0).any():
             yield f"cause of {about}", t_s, cause, "a UGV that is intervened on"
@@ -216,7 +216,8 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
     period_s, ends_s = scenario.gatekeeper.period_s, float(trace.t[-1])
     decided = {*zip(trace.decisions["number"].tolist(), (trace.decisions["t_s"] / period_s).round(), strict=True)}
     runs_out_s = {number: times[-1] for number, times in trace.proposals[["number", "times_s"]].to_numpy()}
-    sent = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s").sort_values("received_s")
+    arrived = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s")
+    sent = arrived.sort_values("received_s", kind="stable")
     for ugv in trace.ugvs:
         news_of = sent[sent["receiver"] == ugv]
         mine = [*zip(*(news_of[name].tolist() for name in ("received_s", "about", "kind")), strict=True)]
@@ -225,8 +226,6 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
                 continue
             over = (t for t, other, news in mine[k + 1 :] if other > about or (other, news) == (about, "withdrawal"))
             until_s = min(next(over, ends_s), ends_s, runs_out_s.get(about, ends_s))
-            first, last = at_s / period_s - SAME_S, until_s / period_s - SAME_S
-            held = range(math.ceil(first) + (scenario.channel is None), math.ceil(last))
-            for sample in held:
+            for sample in range(int(at_s / period_s + SAME_S) + 1, math.ceil(until_s / period_s - SAME_S)):
                 if (about, sample) not in decided:
                     yield f"decision of {ugv} on proposal {about}", sample * period_s, "nothing", "one at each sample"

@@ -95,8 +95,6 @@ FORGERIES: dict[str, tuple[str, Any]] = {
     "refusals called acceptances": ("number of ", column("decisions", "decision", lambda f: "accept")),
     "executed before it arrived": ("number of the proposal", earlier),
     "a part of a joint plan left out": ("parties of proposal 0", only("proposals", lambda f: f[f["number"] != 2])),
-    "no joint plan": ("parties of proposal 0", only(
-        "proposals", lambda f: f.assign(party=[[]] * len(f)))),
     "another cause": ("cause of proposal 0", column("proposals", "cause", lambda f: "ugv1", first(number=0))),
     "last repeats cut off": ("repetition of proposal 4", only(
         "messages", lambda f: f[(f["kind"] != "proposal") | (f["number"] != 4) | (f["attempt"] == 0)])),
@@ -133,7 +131,7 @@ def test_without_a_channel_answers_are_those_of_decisions_and_a_lost_uav_is_sile
     assert line["about"].startswith("sending of answer ")
     tables = {name: getattr(honest, name).replace({"sender": {"south": "north"}}) for name in ("messages", "proposals")}
     (line,) = impossible(replace(honest, **tables), honest.scenario)
-    assert line["about"].startswith("who sends proposal ")
+    assert line["about"].startswith("parties of proposal ")
     south = honest.messages["sender"].eq("south")
     for name, rows in (("sent_s", south), ("read_s", honest.messages["receiver"].eq("south"))):
         forged = column("messages", name, lambda f: 11.0, lambda f, rows=rows: rows)(honest)
