@@ -351,21 +351,28 @@ def _constants(run: Run) -> None:
             bears = float(gain_of_pair(pair, gain)) * (pair.error_m + kept) - pair.error_m
             holds("gain for errors", bears >= -SMALL, bears, "0 m at least", about=about)
         if pair.start_s is not None:
-            start, due = _first_m(run, pair), pair.safe_m - pair.more_m
+            due = pair.safe_m - pair.more_m
+            start = _first_m(run, pair, due)
             holds("safe start of the bodies", start >= due - SMALL, start, f"{due} at least", about=about)
 
 
-def _first_m(run: Run, pair: Pair) -> float:
-    """The least distance of a pair's bodies when both first exist, and under commands given before, m."""
+def _first_m(run: Run, pair: Pair, most_m: float) -> float:
+    """The least distance of a pair's bodies when both first exist, and under commands given before, `most_m` at most.
+
+    What is farther is not searched: rows in which a body rests, or turns about one point, are equally near.
+    """
     rows, bent = run.there(pair.other), run.bent_m(pair)
     many = int(np.searchsorted(run.t_s[rows], run.t_s[rows.start] + pair.start_s - SMALL)) + 1
     apart = run.apart(pair)[:many]
     if len(apart) < 2 or not bent:
-        return pair.shape.least_m(apart)
+        return pair.shape.least_m(apart, most_m)
     parts = _parts(bent)
-    ways = (run.fine(pair.robot, rows.start + k, parts) - run.fine(pair.other, rows.start + k, parts)
-            for k in range(len(apart) - 1))  # fmt: skip
-    return min(pair.shape.least_m(way, steps=parts) for way in ways) - bent / parts**2
+    off = bent / parts**2
+    least = most_m + off
+    for k in range(rows.start, rows.start + len(apart) - 1):
+        way = run.fine(pair.robot, k, parts) - run.fine(pair.other, k, parts)
+        least = pair.shape.least_m(way, least, steps=parts)
+    return least - off
 
 
 def _rolled_m(run: Run, robot: str) -> Array:

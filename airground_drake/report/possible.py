@@ -7,7 +7,7 @@ so no run is simulated for this.
 import math
 from collections.abc import Callable, Iterator
 from functools import partial
-from itertools import permutations
+from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,11 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.registry import method_of
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.report.lines import Line, different
-from airground_drake.scenario.links import make_links
+from airground_drake.scenario.links import make_links, repeats_after
 from airground_drake.scenario.schema import Channel, Scenario
 from airground_drake.scenario.sensing import errors_of
 from airground_drake.scenario.world import make_world
+from airground_drake.sim.events import unheard
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.channel import Message, Transit, lost
 from airground_drake.verify.claim import TIME_TOLERANCE_S as SAME_S
@@ -31,7 +32,7 @@ Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and 
 
 def impossible(trace: Trace, scenario: Scenario) -> Iterator[Line]:
     """A line for the first thing that cannot have been so."""
-    for rule in (_referred, _spoken, _carried, _heard, _measured, _executed):
+    for rule in (_referred, _proposed, _spoken, _carried, _repeated, _heard, _measured, _executed, _decided):
         for about, t_s, theirs, ours in rule(trace, scenario):
             yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
             return
@@ -47,6 +48,23 @@ def _referred(trace: Trace, scenario: Scenario) -> Wrong:
         off = np.min([np.abs(theirs - ours).max(axis=1) for ours in both], axis=0) > SAME_M_S
         for k in np.flatnonzero(off)[:1]:
             yield f"velocity of the preset of {name}, m/s,", t_s[k], theirs[k].tolist(), both[0][k].tolist()
+
+
+def _proposed(trace: Trace, scenario: Scenario) -> Wrong:
+    """A proposal is caused by an intervention on a UGV of its UAV, and all parties of a joint plan get theirs."""
+    names = "number", "robot", "sender", "issued_s", "cause", "party"
+    rows = [*zip(*(trace.proposals[name].tolist() for name in names), strict=True)]
+    got = {(t_s, tuple(party), robot) for _, robot, _, t_s, _, party in rows}
+    charge, ugvs = {uav: {*scenario.in_charge(uav)} for uav in scenario.aerial}, dict(enumerate(trace.ugvs))
+    for number, robot, sender, t_s, cause, numbers in rows:
+        party = [ugvs.get(k, k) for k in numbers]
+        about, row = f"proposal {number}", int(np.searchsorted(trace.t, t_s - SAME_S))
+        if not {robot, cause, *party} <= charge.get(sender, set()):
+            yield f"parties of {about}", t_s, [robot, cause, *party], "UGVs of its UAV"
+        elif not (trace.column(f"{cause}.mode")[row : row + 2] == 1.0).any():
+            yield f"cause of {about}", t_s, cause, "a UGV that is intervened on"
+        elif missing := [mate for mate in party if (t_s, tuple(numbers), mate) not in got]:
+            yield f"parties of {about}", t_s, missing, "each with a part of the joint plan"
 
 
 def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
@@ -108,6 +126,28 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
                 yield "arrival of {} {} (attempt {}, copy {})".format(*key), sent[key[:3]].sent_s, theirs_s, ours_s
 
 
+def _repeated(trace: Trace, scenario: Scenario) -> Wrong:
+    """What a UGV reads over a channel it answers at once; what no answer names the UAV says again."""
+    if scenario.channel is None:
+        return
+    rows = trace.messages[trace.messages["copy"] == 0].sort_values("sent_s").to_dict("records")
+    period_s = repeats_after(scenario) + scenario.control.period_s + SAME_S
+    for ugv in trace.ugvs:
+        answers = [row for row in rows if row["sender"] == ugv]
+        said = {row["sent_s"] for row in answers}
+        read = trace.messages[trace.messages["receiver"] == ugv].dropna(subset="read_s")
+        for kind, number, read_s in read[["kind", "number", "read_s"]].to_numpy():
+            if read_s not in said:
+                yield f"answer of {ugv} to {kind} {number}", read_s, "nothing", "an answer"
+        mine: list[Any] = [*(row for row in rows if row["receiver"] == ugv), {"sent_s": trace.t[-1]}]
+        for row, later in pairwise(mine):
+            known_s = [answer["read_s"] for answer in answers if answer["about"] >= row["about"]]
+            silent_s = scenario.aerial[row["sender"]].lost_at_s or math.inf
+            until_s = min([later["sent_s"], silent_s, *(t for t in known_s if not math.isnan(t))])
+            if row["sent_s"] + period_s < until_s - SAME_S:
+                yield f"repetition of {row['kind']} {row['number']}", row["sent_s"], "nothing", "after no answer"
+
+
 def _heard(trace: Trace, scenario: Scenario) -> Wrong:
     """The last positions of each other that UGVs have are those that their links delivered."""
     links, channel, late = scenario.ugv_links, scenario.channel, scenario.late_samples
@@ -154,6 +194,8 @@ def _measured(trace: Trace, scenario: Scenario) -> Wrong:
 
 def _executed(trace: Trace, scenario: Scenario) -> Wrong:
     """A UGV executes what has arrived, and under a gatekeeper what that accepts, until news about it arrive."""
+    for ugv, t, number in unheard(trace):
+        yield f"number of the proposal that {ugv} executes", t, number, "one that has arrived"
     if scenario.ugv_controller is not None:
         return
     period_s, gated = scenario.gatekeeper.period_s, method_of(trace.meta["method"]).gated
@@ -170,5 +212,27 @@ def _executed(trace: Trace, scenario: Scenario) -> Wrong:
             last = decided.get((ugv, int((t + SAME_S) / period_s)), -1) if gated else number
             news = {(about, kind) for at_s, about, kind in arrived if at_s <= t + SAME_S}
             over = number == -1 and any(about > last or (about, kind) == (last, "withdrawal") for about, kind in news)
-            if (number != last and not over) or (number >= 0 and (number, "proposal") not in news):
+            if number != last and not over:
                 yield f"number of the proposal that {ugv} executes", t, number, last
+
+
+def _decided(trace: Trace, scenario: Scenario) -> Wrong:
+    """A gatekeeper decides at each of its samples on what its UGV holds, until its motion has run out."""
+    if not method_of(trace.meta["method"]).gated:
+        return
+    period_s, ends_s = scenario.gatekeeper.period_s, float(trace.t[-1])
+    decided = {*zip(trace.decisions["number"].tolist(), (trace.decisions["t_s"] / period_s).round(), strict=True)}
+    runs_out_s = {number: times[-1] for number, times in trace.proposals[["number", "times_s"]].to_numpy()}
+    arrived = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s")
+    sent = arrived.sort_values("received_s", kind="stable")
+    for ugv in trace.ugvs:
+        news_of = sent[sent["receiver"] == ugv]
+        mine = [*zip(*(news_of[name].tolist() for name in ("received_s", "about", "kind")), strict=True)]
+        for k, (at_s, about, kind) in enumerate(mine):
+            if kind == "withdrawal" or any(other >= about for _, other, _ in mine[:k]):
+                continue
+            over = (t for t, other, news in mine[k + 1 :] if other > about or (other, news) == (about, "withdrawal"))
+            until_s = min(next(over, ends_s), ends_s, runs_out_s.get(about, ends_s))
+            for sample in range(int(at_s / period_s + SAME_S) + 1, math.ceil(until_s / period_s - SAME_S)):
+                if (about, sample) not in decided:
+                    yield f"decision of {ugv} on proposal {about}", sample * period_s, "nothing", "one at each sample"

@@ -19,7 +19,7 @@ from airground_drake.model.trigger.automaton import Trigger
 from airground_drake.model.trigger.bayes import threshold
 from airground_drake.scenario.budget import budget, takes_room
 from airground_drake.scenario.courses import course
-from airground_drake.scenario.links import make_links
+from airground_drake.scenario.links import repeats_after
 from airground_drake.scenario.outlines import outlines_of
 from airground_drake.scenario.plants import plant_of
 from airground_drake.scenario.schema import Decision, Scenario, Uav
@@ -38,7 +38,6 @@ from airground_drake.ugv.routes.route import Route
 
 # Times of vertices that are this close (s, or relative) are equal but for rounding: they are sums of quotients.
 SAME_TIME = 1e-12
-ANSWERING_S = 0.15  # time that an answer may take besides its way, s
 
 
 def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -> Avoidance:
@@ -50,17 +49,6 @@ def make_avoidance(scenario: Scenario, composition: Composition = "augmented") -
 def make_law(scenario: Scenario, method: Method, composition: Composition = "augmented") -> UgvLaw:
     control, avoidance = scenario.control, make_avoidance(scenario, composition)
     return UgvLaw(avoidance, control.motion_gain_1_s, control.intervention_gain_1_s, method.intervention_on_top)
-
-
-def repeats_after(scenario: Scenario) -> float:
-    """Time after which an unanswered message is repeated, s; infinite without a channel."""
-    if scenario.channel is None:
-        return np.inf
-    down, up = (link.quality for link in make_links(scenario.channel))
-    # so an answer in time is read a planning period before: then the planner asks whether a copy would come too late
-    samples = scenario.gatekeeper.period_s, scenario.control.period_s, scenario.intervention.period_s
-    answering = max(ANSWERING_S, sum(samples))
-    return down.delay_s + up.delay_s + max(down.jitter_s, up.jitter_s) + answering
 
 
 def make_planner(scenario: Scenario, method: Method, uav: str) -> Planner:

@@ -21,7 +21,7 @@ from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.law.avoidance import COMPOSITIONS, Composition
 from airground_drake.model.law.task import Task
-from airground_drake.scenario.links import make_links
+from airground_drake.scenario.links import make_links, repeats_after
 from airground_drake.scenario.load import validated
 from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.sensing import errors_of
@@ -156,7 +156,7 @@ def build_model(
         uav: InterventionPlanner(planner, world, period, channel=channel is not None, alone=len(plans) == 1)
         for uav, planner in plans.items()
     }
-    gatekeeper, retry = None, components.repeats_after(scenario)
+    gatekeeper, retry = None, repeats_after(scenario)
     if chosen.gated:
         gatekeeper = Gatekeeper(
             make_gatekeepers(scenario, law), world, period=scenario.gatekeeper.period_s, control=period,

@@ -3,7 +3,7 @@
 `over` means that a UGV has completed a proposal and follows its own task again; it is not a refusal.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from airground_drake.sim.trace import Trace
 from airground_drake.ugv.reasons import OVER
 
 FEW = 8  # a shape of so many convex parts is first looked at as a whole: most robots come near to nothing
+SAME_S = 1e-9  # times this close are one, s
 ROUNDING_M = 1e-9  # what such a look leaves for rounding, m
 
 
@@ -54,6 +55,16 @@ def extract(trace: Trace) -> list[dict[str, Any]]:
     for robot in trace.robots:
         _add_arrival(trace, robot, trace.rows_before(hits[robot]["t_s"] if robot in hits else np.inf), add)
     return sorted(events, key=lambda event: (event["t_s"], order[event["robot"]]))
+
+
+def unheard(trace: Trace) -> Iterator[tuple[str, float, int]]:
+    """What UGVs execute although no such proposal has arrived: the UGV, the time, s, and the number."""
+    sent = trace.messages[trace.messages["kind"] == "proposal"].sort_values("received_s")
+    for ugv in trace.ugvs:
+        numbers, t_s = trace.samples[f"{ugv}.executing"], trace.samples["t_s"]
+        arrived_s = sent[sent["receiver"] == ugv].drop_duplicates("about").set_index("about")["received_s"]
+        early = (numbers >= 0) & ~(numbers.map(arrived_s) <= t_s + SAME_S)
+        yield from ((ugv, float(t_s[k]), int(numbers[k])) for k in np.flatnonzero(early))
 
 
 def _add_arrival(trace: Trace, robot: str, rows: int, add: Any) -> None:

@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 
 from airground_drake.base.arrays import Array, Indices
+from airground_drake.base.errors import PluginError
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry import outline
 from airground_drake.model.trigger.automaton import FIELDS
 from airground_drake.scenario.load import own, resolved
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.blocks.signals import Status
-from airground_drake.sim.events import extract
+from airground_drake.sim.events import extract, unheard
 from airground_drake.sim.tables import (
     DECISION_COLUMNS,
     DECISION_LISTS,
@@ -91,6 +92,10 @@ def trace_of(
     sent = carried(memories, done.carried, ugvs) if done.carried else messages(memories, trace)
     trace = replace(trace, messages=sent)
     trace.derived("scenario", lambda: given)  # it need not be read from the metadata
+    if given.ugv_controller is not None:
+        for ugv, t_s, number in unheard(trace):
+            said = f"controller {given.ugv_controller.kind!r} says that {ugv} executes {number} at t = {t_s:.9g} s"
+            raise PluginError(f"{said}; allowed: numbers of proposals that have arrived, -1 for none")
     meta["events"] = extract(trace)
     return trace
 

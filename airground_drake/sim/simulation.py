@@ -87,6 +87,8 @@ class Recorder:
         if given := self._own.ugv_controller:
             make = ugv_controller or UGV_CONTROLLERS.load(given.kind, System)
             self._own_code["the UGVs"] = code_of(given.kind, make)
+        if (block := type(self.model.decision_block)) is not DecisionVariable:
+            self._own_code["the trigger"] = code_of(block.__qualname__, block)
         builder = DiagramBuilder()
         builder.AddSystem(self.model.diagram)
         ports = [self.model.diagram.GetOutputPort(name) for name in self.model.recorded]

@@ -175,7 +175,9 @@ Said = tuple[int, str, str, Any]
 
 
 def foxglove(bodies: Motion, late_s: Mapping[str, float]) -> list[Said]:
+    """At first no body is tracked."""
     found: list[Said] = [(EPOCH_NS, "/log", "foxglove.Log", {"message": "on", "level": 2})]
+    found.append((EPOCH_NS, "/tf", "foxglove.FrameTransforms", {"transforms": []}))
     for t, name, place in rows(bodies):
         ns = EPOCH_NS + round(t * 1e9)
         stamp, xyz = {"sec": ns // 10**9, "nsec": ns % 10**9}, dict(zip("xyz", place.tolist(), strict=True))

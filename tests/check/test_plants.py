@@ -9,6 +9,7 @@ import pytest
 from airground_drake.check import plants, safety
 from airground_drake.check.rules import Disagreement
 from airground_drake.check.run import Run, _moves_as_commanded
+from airground_drake.check.shapes import Part
 from airground_drake.model.plants.budget import AT_REST, law_distance
 from airground_drake.scenario.load import load, resolved, validated
 from airground_drake.scenario.plants import plant_of
@@ -90,6 +91,14 @@ def test_an_axle_that_begins_too_near_or_rolls_back_is_found() -> None:
     states, heading = trace.states.copy(), trace.states["burger.heading_rad"][20]
     states.loc[20, place] -= 0.1 * np.array([np.cos(heading), np.sin(heading)])
     assert refuted_for(trace, states) == "never backwards"
+
+
+def test_bodies_that_begin_far_apart_are_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    trace, _ = run_of("lagging", 2.0)
+    places, signed_m = list[int](), Part.signed_m
+    monkeypatch.setattr(Part, "signed_m", lambda part, at_m: places.append(len(at_m)) or signed_m(part, at_m))
+    safety._constants(checked(trace, trace.states))
+    assert sum(places) < 100
 
 
 def test_a_car_that_turns_more_sharply_than_it_can_is_found() -> None:

@@ -79,8 +79,8 @@ FORGERIES: dict[str, tuple[str, Any]] = {
     "read before it arrives": ("reading of ", column("messages", "read_s", lambda f: f["sent_s"])),
     "from a robot": ("who sends ", column("messages", "sender", lambda f: "ugv2", first(kind="proposal"))),
     "sent after the end": ("who sends ", column("messages", "sent_s", lambda f: 1e18)),
-    "to another one": ("sending of proposal", column("proposals", "sender", lambda f: "ugv1")),
-    "sent earlier": ("sending of proposal", column("proposals", "issued_s", lambda f: f["issued_s"] - 0.05)),
+    "to another one": ("parties of proposal", column("proposals", "sender", lambda f: "ugv1")),
+    "sent earlier": ("cause of proposal", column("proposals", "issued_s", lambda f: f["issued_s"] - 0.05)),
     "about another one": ("number of the proposal that answer ", column(
         "messages", "about", lambda f: 9, first(kind="answer"))),
     "a repeat about another one": ("number of the proposal that ", column(
@@ -94,6 +94,14 @@ FORGERIES: dict[str, tuple[str, Any]] = {
         **{f"{ugv}.executing": -1 for ugv in trace.ugvs}))),
     "refusals called acceptances": ("number of ", column("decisions", "decision", lambda f: "accept")),
     "executed before it arrived": ("number of the proposal", earlier),
+    "a part of a joint plan left out": ("parties of proposal 0", only("proposals", lambda f: f[f["number"] != 2])),
+    "another cause": ("cause of proposal 0", column("proposals", "cause", lambda f: "ugv1", first(number=0))),
+    "last repeats cut off": ("repetition of proposal 4", only(
+        "messages", lambda f: f[(f["kind"] != "proposal") | (f["number"] != 4) | (f["attempt"] == 0)])),
+    "a repeated answer cut off": ("answer of ugv2 to withdrawal 6", only(
+        "messages", lambda f: f[(f["kind"] != "answer") | (f["number"] != 8) | (f["attempt"] == 0)])),
+    "decisions left out of which nobody was told": ("decision of ugv3 on proposal 9", only(
+        "decisions", lambda f: f[(f["number"] != 9) | (f["answer"] >= 0)])),
 }  # fmt: skip
 
 
@@ -123,7 +131,7 @@ def test_without_a_channel_answers_are_those_of_decisions_and_a_lost_uav_is_sile
     assert line["about"].startswith("sending of answer ")
     tables = {name: getattr(honest, name).replace({"sender": {"south": "north"}}) for name in ("messages", "proposals")}
     (line,) = impossible(replace(honest, **tables), honest.scenario)
-    assert line["about"].startswith("who sends proposal ")
+    assert line["about"].startswith("parties of proposal ")
     south = honest.messages["sender"].eq("south")
     for name, rows in (("sent_s", south), ("read_s", honest.messages["receiver"].eq("south"))):
         forged = column("messages", name, lambda f: 11.0, lambda f, rows=rows: rows)(honest)

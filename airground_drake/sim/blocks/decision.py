@@ -96,13 +96,15 @@ class DecisionBlock(LeafSystem):
 
     def _valued(self, t: float, parts: Array) -> Array:
         """`value`, checked to be finite: otherwise the trigger would see no crossing."""
-        given: object = self.value(t, parts)
+        return self._numbers(self.value(t, parts), (len(parts),), "x")
+
+    def _numbers(self, given: object, shape: tuple[int, ...], what: str) -> Array:
         with suppress(TypeError, ValueError):
-            x = np.asarray(given, dtype=np.float64)
-            if x.shape == (len(parts),) and np.isfinite(x).all():
-                return x
-        wanted = f"wanted: {len(parts)} finite numbers, m"
-        raise PluginError(f"decision block {type(self).__name__} returned {short(repr(given))} as x; {wanted}")
+            numbers = np.asarray(given, dtype=np.float64)
+            if numbers.shape == shape and np.isfinite(numbers).all():
+                return numbers
+        wanted = f"wanted: {' times '.join(map(str, shape))} finite numbers, m"
+        raise PluginError(f"decision block {type(self).__name__} returned {short(repr(given))} as {what}; {wanted}")
 
     def _range(self, context: Context) -> Array:
         begun, now = context.get_discrete_state(0).value(), self._signals(context)
@@ -112,7 +114,8 @@ class DecisionBlock(LeafSystem):
         """Smallest x over a step, then the largest, (2n,), m, from the signals at its ends."""
         before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
         ends = np.stack([before[:, 4], after[:, 4]])
-        found = self.extremes(begun[0], before[:, :4], now[0], after[:, :4], ends)
+        of_step = self.extremes(begun[0], before[:, :4], now[0], after[:, :4], ends)
+        found = self._numbers(of_step, ends.shape, "the range of x")
         first, last = bends(self._corners, begun[0], now[0])
         if last > first:
             times, parts, bent = stretches(begun, now, self._corners)

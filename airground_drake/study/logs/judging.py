@@ -293,7 +293,7 @@ def _judged(
         starts_s=law.starts_s,
         theorem="Passive" if pair.moves_m_s else "Safety",
         too_fast_m_s=too_fast,
-        promised_m=promised if promised > 0.0 and not pair.moves_m_s else None,
+        promised_m=promised if promised > 0.0 and law.intervals and not pair.moves_m_s else None,
         law_m=eps + math.hypot(pair.safe_m, eps) - pair.radii_m,
         came_m=_came(pair, own, other, Span(max(stretch.begin, at - LAST_S), at)),
     )

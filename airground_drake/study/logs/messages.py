@@ -4,6 +4,7 @@ A message may be an object with attributes (ROS, protobuf) or a dict (JSON).
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -19,6 +20,7 @@ LISTS, NAMES = ("transforms", "poses", "rigidbodies"), ("name", "rigid_body_name
 FIXED = "tf_static"  # topic of transforms that do not change
 # Numbers below are seconds, if they are the stamp of a header; the last nanosecond that is counted.
 SECONDS, LAST_NS = 1e8, 2**63 - 1
+MOST_EMPTY = 100  # messages without a position after which a topic has none: at first a tracked body may be missing
 ROOTS = ("odom", "map", "world")  # frames that are not a robot, although a robot's name may precede them
 
 
@@ -82,7 +84,7 @@ def _first(*values: Any) -> Any:
 def _xyz(point: Any) -> tuple[float, float, float] | None:
     try:
         x, y, z = (float(_of(point, axis)) for axis in "xyz")
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return x, y, z
 
@@ -118,22 +120,28 @@ class Gathered:
         self._rows: dict[tuple[str, str, str, str], list[tuple[int, int | None, tuple[float, float, float]]]] = {}
         self.unused: dict[str, str] = {}  # topics without places, with their types
         self.used: set[str] = set()
+        self._empty = Counter[str]()  # messages without a position, by topic
 
     def may_have(self, topic: str, kind: str) -> bool:
+        if topic in self.used:
+            return True
         if topic in self.unused:
-            return False
+            return 0 < self._empty[topic] < MOST_EMPTY
         has_places = not kind.replace("/msg/", "/").startswith(NO_PLACES) and FIXED not in segments(topic)
         if not has_places or is_elsewhere(topic, self.bodies):
             self.unused[topic] = kind
         return topic not in self.unused
 
     def add(self, topic: str, kind: str, received_ns: int, message: Any) -> None:
-        """Collect the positions of a message; a topic is unused if its first message has no position."""
+        """Collect the positions of a message; a topic is unused if its first `MOST_EMPTY` messages have none."""
         several = list(places(message))
-        if not several and topic not in self.used:
-            self.unused[topic] = kind
-        for place in several:
+        if several:
             self.used.add(topic)
+            self.unused.pop(topic, None)
+        elif topic not in self.used:
+            self.unused[topic] = kind
+            self._empty[topic] += 1
+        for place in several:
             if (segments(place.child) or [""])[-1] in ROOTS:
                 continue
             key = topic, place.body, place.frame, place.child
@@ -156,7 +164,6 @@ class Gathered:
                 nano=np.zeros_like(whole),
                 places=xyz,
                 time_unit="ns",
-                length_unit="m",
                 frame=frame,
                 child=child,
                 clock=HEADERS if stamped else RECEIPT,

@@ -38,6 +38,7 @@ CONTRADICTORY = 0.1
 # A body leaps if it moves farther than this from one row to the next, and this many times faster than its limit. Leaps
 # come from tracking systems that lose a body: they write (0, 0), another number, or the last place again.
 LOST_M, LOST = 0.05, 5.0
+MOST_LEAPS = 0.5  # share of a body's steps that may be leaps
 ORIGIN_M = 1e-3  # robots that start so close to (0, 0) start there
 MOST_PASSES = 100  # of a search for rows that are lost
 # Stretches in the order of time that are compared with each other, and rows of one at least.
@@ -331,6 +332,11 @@ def _track(
         )
     t_s, places = t_s[~lost], places[~lost]
     leaps = t_s[1:][_leaps(t_s, places, fastest_m_s)]
+    if len(leaps) > MOST_LEAPS * len(t_s):
+        raise LogError(
+            f"{name}: {len(leaps)} of {len(t_s) - 1} steps are more than {LOST:g} times faster than {fastest_m_s:g} "
+            "m/s; wanted: --length-unit, --time-unit, or a log of this robot"
+        )
     if len(leaps):
         remarks.append(
             f"{name}: {len(leaps)} steps that are more than {LOST:g} times faster than {fastest_m_s:g} m/s, first to "

@@ -257,13 +257,17 @@ def test_a_recorded_signal_drives_the_trigger_and_its_crossings_are_isolated() -
 
 
 @pytest.mark.parametrize("x", [None, np.full(2, np.nan), np.zeros(3), "x"])
-def test_a_decision_block_that_returns_no_numbers_is_named(x: Any) -> None:
-    class Odd(DecisionBlock):
-        def value(self, t: float, parts: Array) -> Any:
-            return x
+@pytest.mark.parametrize("method", ["value", "extremes"])
+def test_a_decision_block_that_returns_no_numbers_is_named(x: Any, method: str) -> None:
+    odd = type("Odd", (DecisionBlock,), {"value": lambda self, t, parts: np.zeros(2), method: lambda *given: x})
+    with pytest.raises(SimulationError, match=r"decision block Odd returned .*; wanted: .*2 finite numbers"):
+        simulate(load("case_a", {"duration_s": 15.0}), "b", decision_block=odd)
 
-    with pytest.raises(SimulationError, match=r"decision block Odd returned .*; wanted: 2 finite numbers"):
-        simulate(load("case_a", {"duration_s": 15.0}), "b", decision_block=Odd)
+
+def test_a_decision_block_that_raises_is_named_with_its_place() -> None:
+    odd = type("Odd", (DecisionBlock,), {"value": lambda self, t, parts: 1 / 0})
+    with pytest.raises(SimulationError, match=r"test_decision\.py:\d+ ZeroDivisionError: .*: Odd of the trigger\)"):
+        simulate(load("case_a"), "b", decision_block=odd)
 
 
 @pytest.mark.parametrize(

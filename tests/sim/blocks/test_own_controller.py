@@ -107,6 +107,11 @@ class Half(Straight):
         discrete.set_value(1, np.full(self.count, 0.5))
 
 
+class Made(Straight):
+    def update(self, context: Any, discrete: Any) -> None:
+        discrete.set_value(1, np.full(self.count, 5.0 * (context.get_time() > 1.0)) - 1.0)
+
+
 class NoMap(Straight):
     def __init__(self, world: World, law: UgvLaw) -> None:
         raise FileNotFoundError("no map")
@@ -171,6 +176,7 @@ def test_a_class_that_the_scenario_does_not_name_does_not_pass_for_a_controller(
         (Raises, SimulationError, r"t = 0\.\d+ s: test_own_controller\.py:\d+ ZeroDivisionError: .*Raises of the UGVs"),
         (Nowhere, SimulationError, r"Nowhere' has \[nan, nan, nan\] at command; allowed: finite numbers"),
         (Half, SimulationError, r"Half' has \[0\.5\] at executing; allowed: numbers of proposals, -1 for none"),
+        (Made, PluginError, r"Made' says that ugv1 executes 4 at t = 1\.025 s; allowed: .* that have arrived"),
     ],
 )
 def test_a_controller_that_fails_says_which_and_why(make: Any, error: type[Exception], said: str) -> None:

@@ -73,6 +73,9 @@ def test_where_a_body_leaps_nothing_is_claimed(tmp_path: Path, document: dict[st
     assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(3.55), pytest.approx(3.6))]
     assert not judged.covers_all
     assert any("tb_1: 1 steps that are more than 5 times faster than 1 m/s" in said for said in found.remarks)
+    far = written(tmp_path, logs.long({**FULL, "tb_1": (t_s, 1000.0 * places)}))
+    with pytest.raises(LogError, match="tb_1: 120 of 120 steps are more than 5 times faster than 1 m/s; wanted: --len"):
+        logs.read(far, document, length_unit="m")
 
 
 def test_two_recordings_of_one_time_are_refused(tmp_path: Path, document: dict[str, Any]) -> None:

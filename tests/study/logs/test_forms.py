@@ -207,8 +207,9 @@ def two_files(folder: Path) -> list[Path]:
     return [folder / "b.csv", folder / "a.csv"]
 
 
-def of_json(folder: Path, profile: str = "") -> Path:
-    logs.mcap_json(folder / "run.mcap", logs.foxglove(JITTER, LATE), profile)
+def of_json(folder: Path, profile: str = "", scale: float = 1.0) -> Path:
+    scaled = {name: (t_s, scale * places) for name, (t_s, places) in JITTER.items()}
+    logs.mcap_json(folder / "run.mcap", logs.foxglove(scaled, LATE), profile)
     return folder / "run.mcap"
 
 
@@ -434,6 +435,7 @@ FORMS = {
     "dates": Form(table("log.csv", lab(FULL, "date,robot,x,y,z", lambda t: f"2026-05-04T12:00:{t:09.6f}Z")), FULL),
     "Vicon": Form(table("log.csv", vicon), FULL, ("millimetres, as the file says",)),
     "ROS 2, echo": Form(ros2_echo, FULL),
+    "messages in millimetres": Form(partial(of_json, scale=1000.0), JITTER, ("lengths are taken as millimetres",)),
     "named poses": Form(captured, FULL),
     "ROS 1": Form(ros1, JITTER),
     "ROS 2, sqlite3": Form(ros2("SQLITE3"), JITTER),

@@ -208,6 +208,7 @@ def test_messages_that_lie_about_their_fields_are_left_out(tmp_path: Path, docum
     lies: list[Any] = [
         None, [], "text", 7, {"pose": 1}, {"position": {"x": "a", "y": 1, "z": 2}}, {"transforms": 5},
         {"name": ["tb_0"], "pose": []}, {"position": {"x": 1e400, "y": 0, "z": 0}}, {"header": {"stamp": {"sec": "x"}}},
+        {"position": {"x": 10**400, "y": 0, "z": 0}},
     ]  # fmt: skip
     said = logs.foxglove(FULL, {})
     more = [(logs.EPOCH_NS + k, f"/tb_0/lie_{k}", "lie", each) for k, each in enumerate(lies)]
