@@ -28,9 +28,9 @@ def scenario_html(scenario: Scenario) -> str:
         f"{name} from {_place(ugv.start_m)} to {_place(ugv.target_m)}, at most {ugv.max_speed_m_s:g} m/s"
         for name, ugv in scenario.ugvs.items()
     ]
-    told = [f"run {name}: ({run.method}) {METHODS[run.method].says}" for name, run in scenario.runs.items()]
+    lines = [f"run {name}: ({run.method}) {METHODS[run.method].says}" for name, run in scenario.runs.items()]
     uavs = [f"{name}, the UAV" for name in scenario.aerial]
-    listed = "".join(f"<li>{escape(line)}</li>" for line in (*ugvs, *uavs, *told))
+    listed = "".join(f"<li>{escape(line)}</li>" for line in (*ugvs, *uavs, *lines))
     title = f"<p><b>{escape(scenario.title or scenario.name)}</b> {escape(repr(scenario))}</p>"
     return f"{title}{_element(thumbnail(scenario))}<ul>{listed}</ul>"
 

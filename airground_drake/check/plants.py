@@ -172,11 +172,11 @@ def moves_as_its_plant(robot: str, spec: Json, way: Way, steered: Array, command
             row = np.searchsorted(t_s, then - SMALL)  # the first row at or after that time
             rate = np.where((then > SMALL)[:, None], rate[np.minimum(row, len(t_s) - 1)], 0.0)
         elif plant["kind"] == "lag":
-            tau, due = plant["time_constant_s"], np.zeros_like(rate)
+            tau, expected = plant["time_constant_s"], np.zeros_like(rate)
             for k, kept in enumerate(np.exp(-np.diff(t_s) / tau), start=1):
-                due[k] = rate[k] + kept * (due[k - 1] - rate[k])
-            close("velocity of a body", way.velocity_m_s, due, within=SMALL, about=robot, t_s=t_s)
-            point = point - tau * due
+                expected[k] = rate[k] + kept * (expected[k - 1] - rate[k])
+            close("velocity of a body", way.velocity_m_s, expected, within=SMALL, about=robot, t_s=t_s)
+            point = point - tau * expected
         else:
             heading, point = _axle(plant, way, point, rate, period_s)
             close("heading of a body", way.heading_rad, heading, within=SMALL, about=robot, t_s=t_s)

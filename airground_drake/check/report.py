@@ -138,8 +138,8 @@ def _judged(claim: Json, ours: Found) -> str:
     if ours.exercised is not None:
         least, most = ours.exercised
         possible = type(count) is int and least <= count <= most
-        due = f"{least}, at most {most}"
-        holds("how often the claim was exercised", possible, count, due)
+        bounds = f"{least}, at most {most}"
+        holds("how often the claim was exercised", possible, count, bounds)
     if ours.margin is None or margin is None:
         same("margin", margin, ours.margin)
         return str(status)

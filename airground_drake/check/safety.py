@@ -351,9 +351,9 @@ def _constants(run: Run) -> None:
             bears = float(gain_of_pair(pair, gain)) * (pair.error_m + kept) - pair.error_m
             holds("gain for errors", bears >= -SMALL, bears, "0 m at least", about=about)
         if pair.start_s is not None:
-            due = pair.safe_m - pair.more_m
-            start = _first_m(run, pair, due)
-            holds("safe start of the bodies", start >= due - SMALL, start, f"{due} at least", about=about)
+            required = pair.safe_m - pair.more_m
+            start = _first_m(run, pair, required)
+            holds("safe start of the bodies", start >= required - SMALL, start, f"{required} at least", about=about)
 
 
 def _first_m(run: Run, pair: Pair, most_m: float) -> float:

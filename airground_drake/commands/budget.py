@@ -135,10 +135,10 @@ def _as_text(rows: DataFrame, key: str) -> str:
     for law in rows.columns[rows.columns.str.endswith(LAW)]:
         kind = law.removesuffix(LAW)
         promised = rows[f"{kind}{PROMISED}"].map("{:.3f}".format)
-        told = promised + rows[law].map(" -> {:.3f}".format)
+        distances = promised + rows[law].map(" -> {:.3f}".format)
         if (old := f"{kind}{OLD}") in rows:
-            told += rows[old].map(" + {:.3f}".format).where(rows[old].notna(), "")
-        shown[f"{kind}m"] = told.where(rows[law].notna(), "-")
+            distances += rows[old].map(" + {:.3f}".format).where(rows[old].notna(), "")
+        shown[f"{kind}m"] = distances.where(rows[law].notna(), "-")
     shown["arrived"] = (rows["arrived"].map(str) + " of " + rows["ugvs"].map(str)).where(judged, "-")
     shown["last at, s"] = rows["arrival_s"].round(2)
     shown[DISTANCES] = rows[DISTANCES].fillna("-") if DISTANCES in rows else "-"

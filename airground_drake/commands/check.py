@@ -105,8 +105,8 @@ def made_again(
     progress.stage(by)
     command = [sys.executable, "-P", "-m", module, str(folder), str(limit_s), *options]
     with (
-        tempfile.TemporaryFile("w+") as said,
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True) as process,
+        tempfile.TemporaryFile("w+") as output,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=output, text=True) as process,
     ):
         for entry in map(json.loads, process.stdout or ()):
             if JUDGED in entry:
@@ -114,8 +114,8 @@ def made_again(
             else:
                 yield line(**entry)
         if process.wait():
-            said.seek(0)
-            why = said.read().strip().splitlines()[-1:] or [f"its process ended with {process.returncode}"]
+            output.seek(0)
+            why = output.read().strip().splitlines()[-1:] or [f"its process ended with {process.returncode}"]
             yield line("report", "", OPEN, f"not all was {by}: {why[0]}", "the files can be used")
 
 

@@ -77,8 +77,8 @@ def _lines(changes_of: Mapping[str, Any]) -> Iterator[str]:
     if rounded:
         yield f"{counted(rounded, 'number')} changed by no more than rounding: --json has all"
     count = changes_of["regressions"]
-    said = ", ".join(changed) or ("nothing else" if rounded else "nothing")
-    yield f"{said} changed; {counted(count, 'regression') if count else 'no regressions'}"
+    summary = ", ".join(changed) or ("nothing else" if rounded else "nothing")
+    yield f"{summary} changed; {counted(count, 'regression') if count else 'no regressions'}"
 
 
 def _line(change: Mapping[str, Any]) -> str:

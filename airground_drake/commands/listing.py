@@ -67,9 +67,9 @@ def _about(kind: type, name: str) -> list[str]:
             f"{name}: {claim.summary}", statement, f"Decided by: {claim.method}", "Assumes:",
             *(f"- {assumption}" for assumption in claim.assumptions), f"Does not establish: {claim.does_not_establish}",
         ]  # fmt: skip
-    told, _, more = (inspect.getdoc(kind) or "").partition("\n\n")
+    summary, _, more = (inspect.getdoc(kind) or "").partition("\n\n")
     given = ", ".join(parameters(kind)) or "none"
-    return [f"{name}: {' '.join(told.split())}", f"Parameters: {given}.", *more.splitlines()]
+    return [f"{name}: {' '.join(summary.split())}", f"Parameters: {given}.", *more.splitlines()]
 
 
 def _print_keys(beginning: str) -> int:

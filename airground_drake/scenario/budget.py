@@ -54,12 +54,12 @@ class PairBudget(NamedTuple):
 
     def in_words(self) -> str:
         """What the terms take: `hand_point_m 0.078 m each, dip 0.001 m`."""
-        told = []
+        words = []
         for key in dict.fromkeys(term.key for term in self.terms):
             parts = [term.metres for term in self.terms if term.key == key]
             taken = f"{parts[0]:.3f} m each" if len(parts) == 2 and parts[0] == parts[1] else f"{sum(parts):.3f} m"
-            told.append(f"{key} {taken}")
-        return ", ".join(told)
+            words.append(f"{key} {taken}")
+        return ", ".join(words)
 
 
 def takes_room(scenario: Scenario) -> bool:

@@ -38,7 +38,7 @@ def _of_old_positions(scenario: Scenario) -> Iterator[str]:
     starts = {name: ugv.start_m for name, ugv in scenario.ugvs.items()}
     room_m = [pair.law_m - pair.unsure_m for pair in pairs]
     spare_m = [dist(starts[pair.first], starts[pair.second]) - pair.law_m - pair.unsure_m for pair in pairs]
-    for margins_m, told in (
+    for margins_m, text in (
         (room_m, "if they meet, they can block each other for ever"),
         (spare_m, "they start closer than that, so they may only separate"),
     ):
@@ -47,4 +47,4 @@ def _of_old_positions(scenario: Scenario) -> Iterator[str]:
             count = sum(margin_m <= 0.0 for margin_m in margins_m)
             others = f" (the first of {count} pairs)" if count > 1 else ""
             room = f"{pair.law_m:.3g} m in the law plus {pair.unsure_m:.3g} m for the age of positions"
-            yield f"{pair.first} and {pair.second}{others} keep {room}: {told}"
+            yield f"{pair.first} and {pair.second}{others} keep {room}: {text}"

@@ -68,8 +68,8 @@ def parser_of(
     parser = Parser(prog=f"airground {name}", description=description, epilog=epilog, formatter_class=form)
     group = parser.add_mutually_exclusive_group() if exclusive else parser
     for names, own in takes.items():
-        told = OPTIONS.get(names, {}) | ({"help": own} if isinstance(own, str) else own or {})
-        if names.startswith("-") and not told.keys() & {"metavar", "type", "choices", "action"}:
-            told["action"] = "store_true"
-        (group if names in exclusive else parser).add_argument(*names.split(), **told)
+        settings = OPTIONS.get(names, {}) | ({"help": own} if isinstance(own, str) else own or {})
+        if names.startswith("-") and not settings.keys() & {"metavar", "type", "choices", "action"}:
+            settings["action"] = "store_true"
+        (group if names in exclusive else parser).add_argument(*names.split(), **settings)
     return parser

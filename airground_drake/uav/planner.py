@@ -216,15 +216,15 @@ class Planner:
 
     def plan(self, memory: PlannerState, now: Instant) -> PlannerState:
         """The memory after one planning period."""
-        said = [answer_to(talk.proposal, now.answers, i) for i, talk in enumerate(memory.talks)]
-        heard = [report for report, answer in zip(now.reports, said, strict=True) if answer != SILENT]
+        answers = [answer_to(talk.proposal, now.answers, i) for i, talk in enumerate(memory.talks)]
+        heard = [report for report, answer in zip(now.reports, answers, strict=True) if answer != SILENT]
         unknown = {row for report in heard for row in report.sensed} - set(memory.learnt)
         fresh: tuple[Outline, ...] = ()
         if unknown:
             there = self._there(now.t)
             unmapped = [row for row in unknown if not any(there[k] for k in self._rows.get(row, ()))]
             fresh = tuple(sorted(unmapped, key=_place))
-        talks = self._after_answers(memory.talks, now, said, learnt=bool(fresh))
+        talks = self._after_answers(memory.talks, now, answers, learnt=bool(fresh))
         newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen} | {
             sighting.name: (sighting, now.t) for report in heard for sighting in report.seen
@@ -291,16 +291,16 @@ class Planner:
         return tuple(bodies)
 
     def _after_answers(
-        self, talks: Sequence[Negotiation], now: Instant, said: Sequence[float], *, learnt: bool
+        self, talks: Sequence[Negotiation], now: Instant, answers: Sequence[float], *, learnt: bool
     ) -> list[Negotiation]:
         # A proposal is withdrawn if any part of its plan is refused, if its motion is over, or if neither its UGV, nor
         # its cause, nor any party of its joint plan is triggered any more. So a UGV whose part leads it past its preset
         # trajectory goes on: the others' ways were planned with it. Those that did not refuse are asked again at once.
         # If a UGV that may fall behind would have stalled, or was left behind, its motion was too fast.
         t, called = now.t, set(compress(self.ugvs, now.intervening))
-        refused = {talk.proposal.joint for talk, a in zip(talks, said, strict=True) if talk.proposal and a == REFUSE}
+        refused = {talk.proposal.joint for talk, a in zip(talks, answers, strict=True) if talk.proposal and a == REFUSE}
         after = []
-        for i, (name, talk, answer) in enumerate(zip(self.ugvs, talks, said, strict=True)):
+        for i, (name, talk, answer) in enumerate(zip(self.ugvs, talks, answers, strict=True)):
             proposal, trails = talk.proposal, bool(self.trails and self.trails[i])
             party_refused = proposal is not None and bool(proposal.party) and proposal.joint in refused
             party = proposal.party if proposal else ()

@@ -127,10 +127,10 @@ class ArrayJudges:
             return None
         if (noise_off(log.t, log.noise, decision) > NOISE_TOLERANCE_M / 2.0).any() or log.noise[0].any():
             return None
-        lag, due, agreed = replayed(log.t, log.bodies, log.noise, log.x, log.status, team.corners, levels)
+        lag, expected, agreed = replayed(log.t, log.bodies, log.noise, log.x, log.status, team.corners, levels)
         if not agreed or lag > EVENT_TOLERANCE_S / 2.0:
             return None
-        return Finding("holds", margin=EVENT_TOLERANCE_S - lag if lag >= 0.0 else None, unit="s", exercised=due)
+        return Finding("holds", margin=EVENT_TOLERANCE_S - lag if lag >= 0.0 else None, unit="s", exercised=expected)
 
     def _live_goal(self, log: Log) -> Finding | None:
         places = {robot: log.bodies[:, 3 * i : 3 * i + 3] for i, robot in enumerate(self._world.robots)}
@@ -203,8 +203,8 @@ def replayed(
                 return lag, transitions, False
         begun, now = signals[max(k - 1, 0)], signals[k]
         span = ranges(begun, now, corners)
-        due = transitions_due(own, t[k], span, levels)
-        if not due.any():
+        expected = transitions_due(own, t[k], span, levels)
+        if not expected.any():
             continue
         if k == last:  # the run ends before it can be made
             return lag, transitions, False
@@ -216,7 +216,7 @@ def replayed(
             if events > 0:
                 rows = slice(max(k - 1, 0), k + 1)
                 lag = max(lag, t[k] - _first_due(j, before, t[rows], bodies[rows], noise[rows], corners, levels))
-            elif due[j]:
+            elif expected[j]:
                 events = 1  # the end of a refractory time
             transitions += events
     return lag, transitions, True

@@ -153,8 +153,8 @@ class _Case(NamedTuple):
 
     def verdict(self, scenario: Scenario, finding: Finding) -> Verdict:
         expected = scenario.runs[self.run].expected if self.run else scenario.expected
-        due = expected.get(self.claim.id, self.claim.due(scenario.ugv_controller))
-        return Verdict.of(self.claim, self.run, finding, due, self.inputs)
+        expectation = expected.get(self.claim.id, self.claim.due(scenario.ugv_controller))
+        return Verdict.of(self.claim, self.run, finding, expectation, self.inputs)
 
 
 def _cases(scenario: Scenario, claims: Collection[str] | None = None) -> list[_Case]:

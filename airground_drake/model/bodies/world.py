@@ -220,10 +220,10 @@ class World:
     @cached_property
     def steering(self) -> Array | None:
         """The UGVs' steering parameters, (n, 6), see `model.plants.steering`; None if no UGV limits its commands."""
-        found = [body.plant.steering if body.plant else None for body in self.bodies[self.select("ugv")]]
-        if all(numbers is None for numbers in found):
+        of_ugvs = [body.plant.steering if body.plant else None for body in self.bodies[self.select("ugv")]]
+        if all(numbers is None for numbers in of_ugvs):
             return None
-        return np.array([np.zeros(NUMBERS) if numbers is None else numbers for numbers in found])
+        return np.array([np.zeros(NUMBERS) if numbers is None else numbers for numbers in of_ugvs])
 
     @cached_property
     def signals(self) -> tuple[str, ...]:

@@ -61,9 +61,9 @@ class Ackermann(Unicycle):
 
     @property
     def steering(self) -> Array:
-        found = super().steering
-        found[RADIUS] = self.radius_m
-        return found
+        numbers = super().steering
+        numbers[RADIUS] = self.radius_m
+        return numbers
 
     def trails(self, speed_m_s: float) -> bool:
         return True  # behind every motion that turns at once

@@ -160,18 +160,18 @@ def _leg(hypotenuse: float, leg: float) -> float:
 
 def costs(distance: float, one: Bounds, other: Bounds = AT_REST, *, gain: float, passive: bool = False) -> list[Cost]:
     """The positive terms that `law_distance` adds to a distance, m, in order."""
-    found = list(_added(one, other, gain=gain, passive=passive))
+    terms = list(_added(one, other, gain=gain, passive=passive))
     if not passive:
         delay = _delay(one, other)
         lag = float(_lagging(distance + delay, one, other)) - (distance + delay)
-        found += [Cost("delay", -1, delay), Cost("lag", -1, lag)]
+        terms += [Cost("delay", -1, delay), Cost("lag", -1, lag)]
     if _draws(one, other, passive=passive):
-        found.insert(0, Cost("cover", 0, math.hypot(distance, one.cover_m) - distance))
+        terms.insert(0, Cost("cover", 0, math.hypot(distance, one.cover_m) - distance))
     if error := one.error_m + other.error_m:
-        kept = distance + sum(cost.metres for cost in found if cost.term != "drift")
+        kept = distance + sum(cost.metres for cost in terms if cost.term != "drift")
         views = float(of_views(distance, one, other, gain=gain))
-        found += [Cost("error", -1, error + math.hypot(kept, error) - kept), Cost("views", -1, views)]
-    return [cost for cost in found if cost.metres > 0.0]
+        terms += [Cost("error", -1, error + math.hypot(kept, error) - kept), Cost("views", -1, views)]
+    return [cost for cost in terms if cost.metres > 0.0]
 
 
 def _added(one: Bounds, other: Bounds, *, gain: float, passive: bool) -> Iterator[Cost]:
@@ -201,11 +201,11 @@ def _lagging(distance: Array | float, one: Bounds, other: Bounds) -> Array | flo
     if not (one.lag_s or other.lag_s):
         return distance
     closing = one.speed_m_s + other.speed_m_s
-    found = [
+    distances = [
         _apart(one, other, tau) + np.sqrt(np.square(distance) + (tau * closing) ** 2)
         for tau in (0.0, one.lag_s, other.lag_s)
     ]
-    least: Array | float = np.minimum.reduce(found)
+    least: Array | float = np.minimum.reduce(distances)
     return least
 
 

@@ -49,15 +49,15 @@ def chord(a: float, b: float, hand: float, period: float) -> tuple[float, float]
 @njit(cache=True)
 def share(a: float, b: float, steering: Array, period: float) -> float:
     """The feasible factor s of a command (a, b), m/s, in the frame of the body: above 0, at most 1."""
-    hand, most, found = steering[HAND], steering[TURN], 1.0
+    hand, most, factor = steering[HAND], steering[TURN], 1.0
     if most * period < math.pi:
         tangent = math.tan(0.5 * most * period)
         excess = period * (abs(b) - a * tangent)
         if excess > 2.0 * hand * tangent:
-            found = 2.0 * hand * tangent / excess
-    if _wheels(found * a, found * b, steering, period) <= steering[WHEEL]:
-        return found
-    low, high = 0.0, found
+            factor = 2.0 * hand * tangent / excess
+    if _wheels(factor * a, factor * b, steering, period) <= steering[WHEEL]:
+        return factor
+    low, high = 0.0, factor
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         if _wheels(middle * a, middle * b, steering, period) <= steering[WHEEL]:
@@ -145,12 +145,12 @@ def along(base: Array, velocity: Array, heading: float, elapsed: float, hand: fl
     half = 0.5 * omega * elapsed
     length = v * elapsed * (math.sin(half) / half if half != 0.0 else 1.0)  # of the chord of the axle's arc
     ahead, left = length * math.cos(half) - hand, length * math.sin(half)
-    found = np.empty(4)
-    found[0] = base[0] - elapsed * velocity[0] + (ahead * cos - left * sin)
-    found[1] = base[1] - elapsed * velocity[1] + (ahead * sin + left * cos)
-    found[2] = base[2] - elapsed * velocity[2]
-    found[3] = heading + 2.0 * half
-    return found
+    state = np.empty(4)
+    state[0] = base[0] - elapsed * velocity[0] + (ahead * cos - left * sin)
+    state[1] = base[1] - elapsed * velocity[1] + (ahead * sin + left * cos)
+    state[2] = base[2] - elapsed * velocity[2]
+    state[3] = heading + 2.0 * half
+    return state
 
 
 @njit(cache=True)

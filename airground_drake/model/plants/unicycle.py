@@ -84,11 +84,11 @@ class Unicycle(Plant):
 
     @property
     def steering(self) -> Array:
-        found = np.zeros(NUMBERS)
-        found[HAND], found[TURN] = self.hand_m, self.max_turn_rad_s
-        found[HALF_BASE], found[WHEEL] = 0.5 * self.wheel_base_m, self.max_wheel_m_s
-        found[FORWARD] = not self.backwards
-        return found
+        numbers = np.zeros(NUMBERS)
+        numbers[HAND], numbers[TURN] = self.hand_m, self.max_turn_rad_s
+        numbers[HALF_BASE], numbers[WHEEL] = 0.5 * self.wheel_base_m, self.max_wheel_m_s
+        numbers[FORWARD] = not self.backwards
+        return numbers
 
     @property
     def limit_rad_s(self) -> float:
@@ -136,8 +136,8 @@ class Unicycle(Plant):
 
     def at(self, memory: Array, base: Array, command: Array, elapsed_s: float) -> Array:
         """Axle and heading, exact."""
-        found: Array = along(base, command, float(memory[0]), elapsed_s, self.hand_m, self.period_s)
-        return found
+        state: Array = along(base, command, float(memory[0]), elapsed_s, self.hand_m, self.period_s)
+        return state
 
     def bends_m(self, t_s: Array, signals: Array) -> Array:
         """The sagitta of each arc."""

@@ -151,14 +151,14 @@ def variants(problem: Problem, loop: ClosedLoop) -> dict[str, dict[str, Any]]:
     # - `velocities at the plan`: those of the closed loop where the plan leads; the search starts as in the run.
     plans, route = ConstantPlans.of(problem), NonlinearRoute()
     dearer = plans.refuse if plans.better is plans.accept else plans.accept
-    told: dict[str, dict[str, Any]] = {}
+    entries: dict[str, dict[str, Any]] = {}
     for name, start in ((AS_RUN, plans.better), (OTHER_START, dearer)):
         omega, _ = route.relax(problem, start, Budget())
-        told[name] = {"answer": "the solver failed"}
+        entries[name] = {"answer": "the solver failed"}
         if omega is not None:
-            told[name] = _told(omega, problem.evaluate(omega).objective)
+            entries[name] = _told(omega, problem.evaluate(omega).objective)
     omega = at_the_plan(problem, loop, plans.better.omega)
-    return told | {AT_THE_PLAN: _told(omega, cost_at_the_plan(problem, loop, omega))}
+    return entries | {AT_THE_PLAN: _told(omega, cost_at_the_plan(problem, loop, omega))}
 
 
 def _told(omega: Array, cost: float) -> dict[str, Any]:

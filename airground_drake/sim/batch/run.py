@@ -382,21 +382,21 @@ def _schedule(
     changes: tuple[float, ...],
 ) -> tuple[Array, loop.Ints]:
     """Times of all timed events, s, and the events due then, by Drake's arithmetic: k times the period."""
-    found: dict[float, int] = {}
+    ticks_at: dict[float, int] = {}
     for bit, period in ((loop.CONTROL, control_s), (loop.NOISE, noise_s)):
         for k in range(int(duration_s / period) + 2):
-            found[k * period] = found.get(k * period, 0) | bit
+            ticks_at[k * period] = ticks_at.get(k * period, 0) | bit
     for bit, period in periods:
         ticks = Ticks(period, control_s)
         for k in range(int(duration_s / ticks.period) + 2):
             t = k * ticks.period
-            found[t] = found.get(t, 0) | (bit if ticks.due(t) else 0)
+            ticks_at[t] = ticks_at.get(t, 0) | (bit if ticks.due(t) else 0)
     samples = [k * control_s for k in range(int(duration_s / control_s) + 2)]
     for time_s in (0.0, *changes) if changes else ():
         for sample in [t for t in samples if t + SAME_S >= time_s][:1]:
-            found[sample] |= loop.WATCH
-    times = sorted(found)
-    return np.array(times), np.array([found[t] for t in times], dtype=np.int64)  # nothing writes to them
+            ticks_at[sample] |= loop.WATCH
+    times = sorted(ticks_at)
+    return np.array(times), np.array([ticks_at[t] for t in times], dtype=np.int64)  # nothing writes to them
 
 
 END = ((0, 1), (0, 0), (0, 0))  # an unused row after the pieces of a hold, which then has as many as breaks

@@ -263,8 +263,8 @@ def sampling_of(system: LeafSystem) -> list[float]:
 
 def of_ugvs(near: Neighbours, law: UgvLaw, robots: int, sampling_s: list[float]) -> dict[str, Any]:
     """Parameters of the UGVs' controller, see `read_back`, and whether it puts interventions above avoidance."""
-    found = read_back(near, law.avoidance, robots, sampling_s)
-    return {**found, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
+    parameters = read_back(near, law.avoidance, robots, sampling_s)
+    return {**parameters, "composition": law.avoidance.composition, "intervention_on_top": law.intervention_on_top}
 
 
 def read_back(near: Neighbours, avoidance: Avoidance, robots: int, sampling_s: list[float]) -> dict[str, Any]:

@@ -115,7 +115,7 @@ class DecisionBlock(LeafSystem):
         before, after = begun[1:].reshape(-1, 5), now[1:].reshape(-1, 5)
         ends = np.stack([before[:, 4], after[:, 4]])
         of_step = self.extremes(begun[0], before[:, :4], now[0], after[:, :4], ends)
-        found = self._numbers(of_step, ends.shape, "the range of x")
+        extremes = self._numbers(of_step, ends.shape, "the range of x")
         first, last = bends(self._corners, begun[0], now[0])
         if last > first:
             times, parts, bent = stretches(begun, now, self._corners)
@@ -124,8 +124,8 @@ class DecisionBlock(LeafSystem):
             found_in = np.array(
                 [self.extremes(t0, p0, t1, p1, np.array([x0, x1])) for (t0, p0, x0), (t1, p1, x1) in pieces]
             )
-            found = np.where(bent, [found_in[:, 0].min(axis=0), found_in[:, 1].max(axis=0)], found)
-        return found.ravel()
+            extremes = np.where(bent, [found_in[:, 0].min(axis=0), found_in[:, 1].max(axis=0)], extremes)
+        return extremes.ravel()
 
     def _begin_step(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         """Keep the signals of this instant: the end of a step, or the start of a simulator."""

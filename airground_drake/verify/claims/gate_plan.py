@@ -181,9 +181,9 @@ def compare_plan(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:
         )
         other = min(given["objective_accept"], given["objective_refuse"])
         for name, trajectory in zip(("refuse", "accept"), row.constant, strict=True):
-            thus = float(row.cost(trajectory))
-            shift = given[f"{name}_throughout"] - thus
-            yield Deviation(row, f"{name} throughout", shift, cost_tolerance(thus), recomputed=thus)
+            recomputed = float(row.cost(trajectory))
+            shift = given[f"{name}_throughout"] - recomputed
+            yield Deviation(row, f"{name} throughout", shift, cost_tolerance(recomputed), recomputed=recomputed)
         yield Deviation(row, "the other choice is cheaper", max(0.0, given["objective"] - other), tolerance)
         yield Deviation(row, "first stage", float(given["plan_first_stage"] != first), 0.0, plan=first)
         shift = given["predicted_clearance_m"] - clearance

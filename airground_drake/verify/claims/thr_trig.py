@@ -107,9 +107,9 @@ class ThrTrig(TraceClaim):
         levels = levels_of(trace)
         judged = [_judged(trace, ugv, levels) for ugv in trace.ugvs]
         wrong = [*_of_strangers(trace), *(conflict for ugv in judged for conflict in ugv.wrong)]
-        due = Counter(kind for ugv in judged for kind in _as_transitions(ugv.predicted))
+        expected = Counter(kind for ugv in judged for kind in _as_transitions(ugv.predicted))
         replayed = [ugv.evidence for ugv in judged]
-        lags = [(found["worst_time_difference_s"], found["robot"]) for found in replayed if found["events"]]
+        lags = [(replay["worst_time_difference_s"], replay["robot"]) for replay in replayed if replay["events"]]
         worst = max(lags) if lags and not wrong else None
         return Finding(
             "refuted" if wrong else "holds",
@@ -122,10 +122,10 @@ class ThrTrig(TraceClaim):
                 "ugvs": replayed,
                 "decision_block": _block(trace) or "that of (15)",
                 **levels._asdict(),
-                "transitions_due": dict(due),
+                "transitions_due": dict(expected),
                 **isolation(trace.scenario.decision.noise_period_s, trace.scenario.control.period_s, levels),
             },
-            exercised=due.total(),
+            exercised=expected.total(),
         )
 
 

@@ -30,8 +30,8 @@ class Theorem:
 
 def _read(file: Path) -> Iterator[Theorem]:
     for comment in _COMMENT.finditer(file.read_text(encoding="utf-8")):
-        said, _, silent_on = comment["body"].partition("\n    Silent on: ")
-        statement, *hypotheses = (" ".join(part.split()) for part in said.split("\n    - "))
+        established, _, silent_on = comment["body"].partition("\n    Silent on: ")
+        statement, *hypotheses = (" ".join(part.split()) for part in established.split("\n    - "))
         name, equation = f"{file.stem}.{comment['name']}", comment["equation"] or "ours"
         yield Theorem(name, equation, statement, tuple(hypotheses), " ".join(silent_on.split()))
 

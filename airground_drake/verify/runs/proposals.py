@@ -118,8 +118,8 @@ def _of_ugv(trace: Trace, ugv: str) -> list[Acceptance]:
     mine = table[table["robot"] == ugv].sort_values("t_s", kind="stable")
     given = zip(*(mine[name].tolist() for name in ("number", "decision", "t_s", "new")), strict=True)
     answers = [(*key, [(t, len(new)) for *_, t, new in rows]) for key, rows in groupby(given, lambda row: row[:2])]
-    for (number, said, rows), following in zip_longest(answers, answers[1:]):
-        if said == "accept":
+    for (number, answer, rows), following in zip_longest(answers, answers[1:]):
+        if answer == "accept":
             on = proposal_of(trace, number)
             back = following is not None and following[0] == number
             last = following[2][:1] if back else []
@@ -179,6 +179,6 @@ def _is_lost(trace: Trace, ugv: str) -> bool:
 
 def reasons(trace: Trace) -> dict[str, str]:
     """The reasons of the last policy asked, by UGV without a proposal; UGVs without a reason are left out."""
-    said = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
+    last_reasons = trace.plans[trace.plans["reason"] != ""].groupby("ugv", sort=False)["reason"].last()
     lost = [*without_proposals(trace), *lost_at_the_end(trace)]
-    return {ugv: str(said[ugv]) for ugv in dict.fromkeys(lost) if ugv in said.index}
+    return {ugv: str(last_reasons[ugv]) for ugv in dict.fromkeys(lost) if ugv in last_reasons.index}
