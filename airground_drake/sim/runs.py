@@ -119,8 +119,7 @@ def _simulated(
 ) -> Iterator[Trace]:
     """Simulate runs of validated scenarios, each in a process of its own; arguments as of `simulate_all`."""
     most = processors() if jobs is None else max(1, jobs)
-    kept_in = kernels.avoid_one.stats.cache_path
-    compiled = any(Path(str(kept_in)).glob("kernels.*.nbi"))
+    compiled, kept_in = _compiled(), kernels.avoid_one.stats.cache_path
     if not compiled:
         progress.stage("compiling, once, about half a minute")
     if forks():  # modules that each run would load itself otherwise
@@ -194,3 +193,8 @@ def _stop(processes: list[BaseProcess]) -> None:
         process.kill()
         process.join()
         process.close()
+
+
+def _compiled() -> bool:
+    """Whether the cache of numba holds the compiled control law."""
+    return any(Path(str(kernels.avoid_one.stats.cache_path)).glob("kernels.*.nbi"))
