@@ -95,7 +95,8 @@ def drawn(seed: int, gain_share: float = 1.0, *, own_views: bool = False) -> Dra
     }  # fmt: skip
     scenario = from_data(data, f"draw {seed}")
     scenario.control.avoidance_gain_1_s = share / PERIOD_S
-    return Draw(scenario, discs.round(4), distance, error)
+    discs[:, :2] = discs[:, :2].round(4)
+    return Draw(scenario, discs, distance, error)
 
 
 def _is_free(places: Array, discs: Array, room_m: float) -> bool:
