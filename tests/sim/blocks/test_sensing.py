@@ -235,9 +235,7 @@ def test_the_condition_on_the_gain_is_needed(error: float) -> None:
     assert orbited(error, 0.2) < 0.6 - 0.1 * error
 
 
-def circled(
-    angle: float, *, own_views: bool, error: float = 0.08, distance: float = 0.6, period: float = 0.05
-) -> float:
+def circled(angle: float, *, own_views: bool, error: float = 0.08, distance: float = 0.6) -> float:
     """The least distance, m, of two robots that circle each other, each as fast as it may along what it sees."""
     gain, speed, period = 6.0, 1.0, 0.05
     body = Bounds(error_m=0.5 * error, speed_m_s=speed, own_views=own_views)
