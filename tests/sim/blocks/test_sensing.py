@@ -1,6 +1,7 @@
 """Errors of measured positions: robots act on what they see, claims are about what is true, and the law pays for it."""
 
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
@@ -85,15 +86,21 @@ def test_what_robots_act_on_is_recorded_within_its_bound(errors: str) -> None:
 
 
 def test_robots_that_measure_each_other_pay_for_different_directions(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario, claims = crossing(errors="adversarial", shared=False), ("SAFE-TRACE", "SAFE-HYP")
-    trace = simulate(scenario, "d")
+    scenario, claims = crossing(errors="adversarial", shared=False, seed=5), ("SAFE-TRACE", "SAFE-HYP")
+    trace = simulate(scenario, "a")
     assert not np.array_equal(trace.as_seen("ugv1", "ugv2"), trace.as_seen("ugv2", "ugv2"))
     assert found(trace, *claims) == dict.fromkeys(claims, "holds")
     assert safety.safe_hyp(checked(trace)).status == "holds"
     assert [*impossible(trace, scenario)] == []
     pair = pair_of(trace, "ugv1", "ugv2")
     missed = max(kept.missed_m.max() for kept in guarantees(trace) if kept.pair == pair)
-    assert 0.01 < missed / (0.5 * 8.0 * 0.05) < pair.views_m  # the share of each, along the direction of the other
+    assert 0.0 < missed < 0.002  # by the better view of each sample; either view alone misses more than 0.007 m
+    ours = checked(trace)
+    (law,) = (of.in_the_law for of in ours.pairs if {of.robot, of.other} == {"ugv1", "ugv2"})
+    assert law.safe_m == pytest.approx(pair.law_m, abs=1e-12)
+    rows = ours.period_rows(law.other)
+    lacks = safety.measured_shortfall_m(ours, law, rows, Fraction(0.5 * 8.0 * 0.05), Fraction(1))
+    assert float(lacks) == pytest.approx(missed, rel=1e-6)
     samples = trace.samples.copy()
     samples.loc[40, "uav.saw_ugv2_x_m"] = trace.position("ugv2")[trace.sample_rows[40], 0] + ERROR_M + 1e-6
     assert broken_rules(replace(trace, samples=samples))[1] == "error of the measured position"
@@ -101,7 +108,7 @@ def test_robots_that_measure_each_other_pay_for_different_directions(monkeypatch
     assert (verdict.status, "Budget.own_views" in verdict.evidence["theorems"]) == ("proved", True)
     right = vars(Body)["bounds"].fget
     monkeypatch.setattr(Body, "bounds", property(lambda self: right(self)._replace(own_views=False)))
-    wrong = simulate(scenario, "d")
+    wrong = simulate(scenario, "a")
     assert safety.safe_hyp(checked(wrong)).status == found(wrong, "SAFE-HYP")["SAFE-HYP"] == "refuted"
 
 
