@@ -57,10 +57,10 @@ def drawn(seed: int, gain_share: float = 1.0, *, own_views: bool = False) -> Dra
     error, distance, speed = rng.uniform(0.02, 0.1), rng.uniform(0.5, 0.8), rng.uniform(1.0, 6.0)
     if own_views:
         error, speed = 0.4 * error, 0.3 * speed
-    one = Bounds(error_m=error, speed_m_s=speed, own_views=own_views)
-    least = least_gain(distance, one, one) * (1.0 + 1e-9)
+    robot = Bounds(error_m=error, speed_m_s=speed, own_views=own_views)
+    least = least_gain(distance, robot, robot) * (1.0 + 1e-9)
     share = rng.uniform(least, 1.0) if gain_share == 1.0 else gain_share * least
-    room_m = max(distance + 0.25, float(law_distance(distance, one, one, gain=max(share, least) / PERIOD_S)) + 1e-3)
+    room_m = max(distance + 0.25, float(law_distance(distance, robot, robot, gain=max(share, least) / PERIOD_S)) + 1e-3)
     while True:
         angles = np.sort(rng.uniform(0.0, math.tau, ROBOTS))
         start = CIRCLE_M * np.stack([np.cos(angles), np.sin(angles)], axis=1)

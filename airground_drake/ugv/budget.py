@@ -37,3 +37,6 @@ class Budget:
     def left_s(self) -> float:
         """Time to the deadline, s, not below 0; inf without one."""
         return math.inf if self.deadline_s == math.inf else max(0.0, self.deadline_s - self.clock())
+
+
+COUNTED = Budget()  # counted work only, as in simulations

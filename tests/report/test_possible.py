@@ -100,7 +100,7 @@ FORGERIES: dict[str, tuple[str, Any]] = {
         "messages", lambda f: f[(f["kind"] != "proposal") | (f["number"] != 4) | (f["attempt"] == 0)])),
     "a repeated answer cut off": ("answer of ugv2 to withdrawal 6", only(
         "messages", lambda f: f[(f["kind"] != "answer") | (f["number"] != 8) | (f["attempt"] == 0)])),
-    "decisions left out of which nobody was told": ("decision of ugv3 on proposal 9", only(
+    "refusals left out that were not sent": ("decision of ugv3 on proposal 9", only(
         "decisions", lambda f: f[(f["number"] != 9) | (f["answer"] >= 0)])),
 }  # fmt: skip
 

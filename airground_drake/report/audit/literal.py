@@ -18,7 +18,7 @@ from airground_drake.sim.components import make_horizon, make_presets, make_rout
 from airground_drake.sim.simulation import Recorder
 from airground_drake.sim.trace import Trace
 from airground_drake.ugv.answer import GatekeeperDecision
-from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.budget import COUNTED
 from airground_drake.ugv.cost import plan_cost
 from airground_drake.ugv.mpc_gatekeeper import PaperGatekeepers
 from airground_drake.ugv.problem import Problem, predicted_loop, sensed
@@ -153,7 +153,7 @@ def variants(problem: Problem, loop: ClosedLoop) -> dict[str, dict[str, Any]]:
     dearer = plans.refuse if plans.better is plans.accept else plans.accept
     entries: dict[str, dict[str, Any]] = {}
     for name, start in ((AS_RUN, plans.better), (OTHER_START, dearer)):
-        omega, _ = route.relax(problem, start, Budget())
+        omega, _ = route.relax(problem, start, COUNTED)
         entries[name] = {"answer": "the solver failed"}
         if omega is not None:
             entries[name] = _told(omega, problem.evaluate(omega).objective)

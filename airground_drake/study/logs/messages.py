@@ -20,7 +20,8 @@ LISTS, NAMES = ("transforms", "poses", "rigidbodies"), ("name", "rigid_body_name
 FIXED = "tf_static"  # topic of transforms that do not change
 # Numbers below are seconds, if they are the stamp of a header; the last nanosecond that is counted.
 SECONDS, LAST_NS = 1e8, 2**63 - 1
-MOST_EMPTY = 100  # messages without a position after which a topic has none: at first a tracked body may be missing
+# A topic is unused after so many messages without a position. The first ones may be empty: a body is not tracked yet.
+MOST_EMPTY = 100
 ROOTS = ("odom", "map", "world")  # frames that are not a robot, although a robot's name may precede them
 
 

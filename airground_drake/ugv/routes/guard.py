@@ -3,7 +3,7 @@
 import abc
 
 from airground_drake.base.arrays import Array
-from airground_drake.ugv.budget import Budget
+from airground_drake.ugv.budget import COUNTED, Budget
 from airground_drake.ugv.problem import Problem
 from airground_drake.ugv.relaxation import unavoidable_cost
 from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cut_short
@@ -12,7 +12,7 @@ from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cut_sh
 class Guarded(abc.ABC):
     """A route that searches unless numbers are not finite, or the budget is spent once constant plans are known."""
 
-    def solve(self, problem: Problem, budget: Budget = Budget()) -> Solution:  # noqa: B008 (immutable)
+    def solve(self, problem: Problem, budget: Budget = COUNTED) -> Solution:
         if not problem.is_finite():
             return Solution(False, "refused_not_finite")
         constants = ConstantPlans.of(problem)

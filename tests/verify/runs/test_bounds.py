@@ -37,14 +37,14 @@ def problems(draw: st.DrawFn) -> GateData:
 @given(st.lists(problems(), min_size=1, max_size=3))
 def test_the_enclosure_contains_the_relaxed_optimum_and_is_below_every_plan(several: list[GateData]) -> None:
     rows = [data.row(np.zeros(STAGES)) for data in several]
-    for row, data, found in zip(rows, several, enclose(rows), strict=True):
+    for row, data, enclosure in zip(rows, several, enclose(rows), strict=True):
         costs = row.cost(row.positions(ALL_PLANS), data.normals)
         ours = [data.plan_cost(plan, along=True) for plan in ALL_PLANS[::37]]
         np.testing.assert_allclose(costs[::37], ours, rtol=1e-12)
-        assert found.other_first <= costs[ALL_PLANS[:, 0] == 1.0].min() + 1e-12
-        assert found.lower <= min(costs.min(), optimum := data.relaxed_optimum()) + 1e-12
-        assert found.upper <= optimum + 1e-6 * row.scale
-        assert 0.0 <= found.upper - found.lower + 1e-12 <= 1e-6 * row.scale
+        assert enclosure.other_first <= costs[ALL_PLANS[:, 0] == 1.0].min() + 1e-12
+        assert enclosure.lower <= min(costs.min(), optimum := data.relaxed_optimum()) + 1e-12
+        assert enclosure.upper <= optimum + 1e-6 * row.scale
+        assert 0.0 <= enclosure.upper - enclosure.lower + 1e-12 <= 1e-6 * row.scale
 
 
 @examples(25, fuzz=2000)
@@ -54,11 +54,11 @@ def test_the_bound_holds_whatever_the_solver_returns(data: GateData, seed: int) 
     rubbish = [rng.uniform(0.0, 1.0, STAGES)], [rng.exponential(1.0, (STAGES, len(data.distances_m)))]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gate_plan, "_solve", lambda rows: rubbish)
-        (found,) = enclose([row])
+        (enclosure,) = enclose([row])
     costs = row.cost(row.positions(ALL_PLANS), data.normals)
-    assert found.lower <= costs.min() + 1e-12
-    assert found.other_first <= costs[ALL_PLANS[:, 0] == 1.0].min() + 1e-12
-    assert found.upper >= data.relaxed_optimum() - 1e-9
+    assert enclosure.lower <= costs.min() + 1e-12
+    assert enclosure.other_first <= costs[ALL_PLANS[:, 0] == 1.0].min() + 1e-12
+    assert enclosure.upper >= data.relaxed_optimum() - 1e-9
 
 
 @examples(25, fuzz=300)
@@ -73,9 +73,9 @@ def test_it_is_narrow_where_the_solver_stops_early_because_costs_are_tiny(
     with pytest.MonkeyPatch.context() as patch:
         solved = [rng.uniform(0.9, 1.0, STAGES)], [np.zeros((STAGES, m))]
         patch.setattr(gate_plan, "_solve", lambda rows: solved)
-        (found,) = enclose([row])
-    assert found.lower <= data.relaxed_optimum() + 1e-12
-    assert found.upper - found.lower <= gate_plan.WIDE * row.scale
+        (enclosure,) = enclose([row])
+    assert enclosure.lower <= data.relaxed_optimum() + 1e-12
+    assert enclosure.upper - enclosure.lower <= gate_plan.WIDE * row.scale
 
 
 def test_plans_of_blocks_are_enumerated(base: Callable[[str], Trace]) -> None:
@@ -90,9 +90,9 @@ def test_a_bad_solution_gives_no_margin(base: Callable[[str], Trace], monkeypatc
 
     monkeypatch.setattr(gate_plan, "_solve", nothing)
     monkeypatch.setattr(gate_plan, "_minimiser", lambda row, _: np.full(STAGES, 0.5))
-    found = decided("GATE-PLAN", base(RELAXED))
-    assert (found.status, found.margin) == ("holds", None)
-    assert found.evidence["optimum"].startswith("unknown: the bounds of an optimum are")
+    finding = decided("GATE-PLAN", base(RELAXED))
+    assert (finding.status, finding.margin) == ("holds", None)
+    assert finding.evidence["optimum"].startswith("unknown: the bounds of an optimum are")
 
 
 def test_the_margin_is_the_largest_gap_and_refutes_nothing(
@@ -101,8 +101,8 @@ def test_the_margin_is_the_largest_gap_and_refutes_nothing(
     bounded = gate_plan.bound(rows_of(base(RELAXED)), 0)
     bounded[1].__dict__["gap"] = 0.4  # a cached property
     monkeypatch.setattr(gate_plan, "bound", lambda rows, blocks: bounded)
-    found = decided("GATE-PLAN", base(RELAXED))
-    assert (found.status, found.margin, found.where["t_s"]) == ("holds", 0.4, bounded[1].row.t_s)
+    finding = decided("GATE-PLAN", base(RELAXED))
+    assert (finding.status, finding.margin, finding.where["t_s"]) == ("holds", 0.4, bounded[1].row.t_s)
 
 
 @pytest.mark.parametrize(
@@ -117,8 +117,8 @@ def test_the_margin_is_the_largest_gap_and_refutes_nothing(
 def test_where_the_optimum_is_unknown_there_is_no_margin(
     base: Callable[[str], Trace], name: str, edit: Edit, why: str
 ) -> None:
-    found = decided("GATE-PLAN", edit(base(name)))
-    assert (found.status, found.margin, found.evidence["optimum"]) == ("holds", None, why)
+    finding = decided("GATE-PLAN", edit(base(name)))
+    assert (finding.status, finding.margin, finding.evidence["optimum"]) == ("holds", None, why)
 
 
 def test_the_gap_to_the_best_of_all_plans_is_evidence(base: Callable[[str], Trace]) -> None:
@@ -133,6 +133,6 @@ def test_the_gap_to_the_best_of_all_plans_is_evidence(base: Callable[[str], Trac
         row |= {"plan_first_stage": "accept" if plan[0] == 1.0 else "refuse"}
         row |= {"predicted_clearance_m": float(rows_of(base(BINARY))[SIXTH].clearance(data.positions(plan)).min())}
 
-    found = decided("GATE-PLAN", decision(other)(base(BINARY)))
-    assert found.status == "holds", found.counterexample
-    assert found.evidence["largest_gap_to_enumeration"] == pytest.approx(max(costs) / min(costs) - 1.0)
+    finding = decided("GATE-PLAN", decision(other)(base(BINARY)))
+    assert finding.status == "holds", finding.counterexample
+    assert finding.evidence["largest_gap_to_enumeration"] == pytest.approx(max(costs) / min(costs) - 1.0)
