@@ -40,7 +40,11 @@ REALISES = {
     "OutcomeGatekeepers": "by outcomes",
     "DirectAcceptance": "accepts all",
     "UgvController": "NSBC, (5)-(8), (20)",
+    "WaryUgvController": "NSBC, stands without positions",
+    "AsynchronousUgvController": "NSBC, by old positions",
+    "ViewsUgvController": "NSBC, by own measurements",
     "UavController": "NSBC, (9)-(11)",
+    "PositionSensing": "errors of positions",
     "TrajectorySource": "preset trajectories",
     "Diagram": "plants, disturbances",
 }
