@@ -25,11 +25,12 @@ from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.control_law import inequalities_of
+from airground_drake.verify.runs.control_law import BINDING_M_S, inequalities_of
 from airground_drake.verify.runs.demands import differences
 from airground_drake.verify.runs.old_positions import heard_at, missed_m, unsure_m
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
+    MOST_LISTED,
     Pair,
     apart_of,
     bounds_of,
@@ -47,8 +48,6 @@ from airground_drake.verify.runs.passive import beside, beside_moving, last_peri
 # A speed may be above its limit by this much, m/s: a command that is shortened to its limit errs by 1e-15 m/s, and in
 # one period of 25 ms this moves a robot by 2.5e-11 m.
 VELOCITY_TOLERANCE_M_S = 1e-9
-BINDING_M_S = 1e-9  # an avoidance inequality binds where a command has no more than this to spare, m/s
-MOST_LISTED = 300  # pairs that the evidence lists at most: those with the least guarantee
 AVOIDANCE = "avoidance"  # the hypothesis that the steps met the inequalities
 PASSIVE = "avoidance beside an obstacle that may move"  # the hypothesis that the steps met the passive law
 DECLARED = "declared speed"  # the hypothesis that an obstacle moved no faster than it was expected to

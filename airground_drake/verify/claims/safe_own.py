@@ -10,10 +10,8 @@ from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.encounters import own_margins, steps_of
-from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, apart_of, pairs_of, snapshot
+from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, MOST_LISTED, apart_of, pairs_of, snapshot
 from airground_drake.verify.runs.passive import beside
-
-MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margin
 
 
 class SafeOwn(TraceClaim):

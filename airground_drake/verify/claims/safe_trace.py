@@ -13,6 +13,7 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.encounters import encounters
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
+    MOST_LISTED,
     apart_of,
     least_gap,
     least_of,
@@ -21,8 +22,6 @@ from airground_drake.verify.runs.pairs import (
     snapshot,
     steered_margin,
 )
-
-MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margin
 
 
 class SafeTrace(TraceClaim):
