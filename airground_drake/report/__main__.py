@@ -119,7 +119,7 @@ def _findings(
 
 def parser() -> Parser:
     return parser_of("report", "Simulate all runs of a scenario, check the claims on them, and write the report.", {
-        "scenario": {"nargs": "?", "help": "name of a shipped scenario, path to a YAML file, or audit"},
+        "scenario": {"nargs": "?", "help": "name of a shipped scenario, path to a YAML file, or audit (of the paper)"},
         "-o --output": f"default: reports/<scenario>; {folder.RULE}",
         "--format": option("comma-separated: html,json,junit (default: all)", kind=formats_of(FORMATS),
                            default=FORMATS),

@@ -64,7 +64,7 @@ def _line(verdict: Verdict) -> str:
     margin = "" if verdict.margin is None else f", margin {verdict.margin:.6g} {verdict.unit}".rstrip()
     of = f" ({verdict.quantity})" if margin and verdict.quantity else ""
     idle = outcome(verdict.status, verdict.exercised) == NOT_EXERCISED
-    status = f"{verdict.status}, nothing to check" if idle else verdict.status
+    status = f"{verdict.status}, not tested" if idle else verdict.status
     tested = f" [{verdict.exercised} {verdict.claim.exercised_by}]" if verdict.exercised is not None else ""
     expected = {True: "", False: f", expected {verdict.expected}", None: ", nothing promised"}[verdict.as_expected]
     return f"{name}: {status}{margin}{of}{tested}{expected}"
