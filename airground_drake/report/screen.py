@@ -207,7 +207,7 @@ def _uav(run: RunFacts) -> Cell:
         lines.append(f"policy failed {counted(failed, 'time')}")
     messages = run.run.metrics.messages
     if messages and (took := messages.proposals + messages.withdrawals + messages.answers):
-        lines.append(f"{counted(took, 'message')} (always-on {sum(messages.always_on.values())})")
+        lines.append(f"{counted(took, 'message')} ({sum(messages.always_on.values())} if always on)")
     return Cell("", lines)
 
 
@@ -302,12 +302,15 @@ def _verdict(those: Iterable[Claim]) -> str:
 def _paper(report: Report) -> Iterator[Check]:
     count = Counter[str](row.status for row in report.reproduction)
     match = sum(count[status] for status in rules.MATCHES)
-    counts = [f"{count[status]} {says}" for status, says in {**rules.MATCHES, **rules.REST}.items() if count[status]]
+    matches, rest = (
+        ", ".join(f"{count[status]} {says}" for status, says in words.items() if count[status])
+        for words in (rules.MATCHES, rules.REST)
+    )
     if not count:
         yield Check("Paper reproduced?", "none", "not a scenario of the paper")
         return
     mark = "yes" if count["reproduced"] == count.total() else "partly" if match else "no"
-    says = f"{match} of {count.total()} numbers match: {', '.join(counts)}"
+    says = f"{match} of {count.total()} numbers match{f' ({matches})' * bool(matches)}{f', {rest}' * bool(rest)}"
     yield Check("Paper reproduced?", mark, says, "reproduction")
 
 

@@ -236,7 +236,7 @@ def test_arrived(edits: list[Edit], mark: str, lines: list[str]) -> None:
           "why refused: waiting looked cheaper"]),
         ("b", [sent((1.0, "released"), (None, "withdrawn first"))], ["2 sent: 1 not begun, 1 obeyed"]),
         ("d", [metric("messages", {"proposals": 1, "withdrawals": 1, "answers": 3, "always_on": {"proposals": 40}})],
-         ["never called", "5 messages (always-on 40)"]),
+         ["never called", "5 messages (40 if always on)"]),
         ("d", [lost(2.0)], ["never called", "fly was lost at 2 s"]),
         ("d", [lost(999.0)], ["never called"]),
     ],
@@ -335,7 +335,7 @@ def test_seeds_and_paper() -> None:
     (told,) = checks(
         "Paper reproduced?", lambda found: found["reproduction"].extend({"id": "", "status": s} for s in statuses)
     )
-    assert told == ("partly", "3 of 4 numbers match: 1 without tuning, 2 after calibration, 1 not")
+    assert told == ("partly", "3 of 4 numbers match (1 without tuning, 2 after calibration), 1 not")
 
 
 def test_what_is_not_as_declared_and_what_not_to_conclude() -> None:

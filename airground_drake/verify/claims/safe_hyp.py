@@ -150,10 +150,10 @@ class SafeHyp(TraceClaim):
         "The command of a row is the velocity applied since the row before (the trace's convention).",
         "The points that the law steers move straight from row to row. For robots that turn, lag or receive commands "
         "late, D and d are about these points: d is d_law of SAFE-BUDGET.",
-        "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
-        "time on, and the safe start is that D >= d at that sample. At that sample, the bodies of robots that lag, "
-        "receive commands late or never drive backwards must also be clear, and so must their paths during the delay "
-        "under commands already given. Otherwise nothing is promised for the pair.",
+        "Beside an obstacle with `appears_s` the hypotheses are judged from that time on, rounded up to a control "
+        "sample; the safe start is that D >= d at that sample. At that sample, the bodies of robots that lag, receive "
+        "commands late or never drive backwards must also be clear, and so must their paths during the delay under "
+        "commands already given. Otherwise nothing is promised for the pair.",
         "Robots act on the measured positions that are recorded.",
         "With `control.law: asynchronous` UGVs are discs that follow commands exactly, and the positions that they "
         "receive were exact when sent.",
