@@ -125,8 +125,8 @@ def parser() -> Parser:
                            default=FORMATS),
         "--set": None,
         "--seed": None,
-        "--seeds": option("also simulate every run with the seeds 1 to N, and say how many keep all distances and "
-                          "bring all home", "N", whole(1), default=0),
+        "--seeds": option("also simulate every run with the seeds 1 to N, and count those with which all distances "
+                          "are kept, and those with which all robots arrive", "N", whole(1), default=0),
         "--no-cache": "repeat experiments about the model instead of reusing earlier results",
         plugins.OPTION: None,
         plugins.SHOW: None,

@@ -222,7 +222,7 @@ def _seeds(report: Report) -> Iterator[Check]:
     )
     for (kept, home, count), names in by_outcome.items():
         mark = "no" if kept < count else "partly" if home < count else "yes"
-        says = f"{', '.join(names)}: distances kept in {kept} of {count}, all home in {home}"
+        says = f"{', '.join(names)}: distances kept in {kept} of {count}, all arrive in {home}"
         yield Check("Other seeds?", mark, says)
         if kept < count:
             worst = min((seed for name in names for seed in of_runs[name]), key=lambda seed: seed.margin_m)
@@ -336,8 +336,8 @@ def _real(report: Report) -> str:
     if not own:
         given = report.scenario.resolved
         error_m, faults = given.position_error_m, given.faults
-        perfect = "sensing is perfect" if given.ugv_links is None else "positions heard are exact"
-        sensing = f"errors of positions are at most {error_m:g} m" if error_m else perfect
+        perfect = "sensing is perfect" if given.ugv_links is None else "received positions are exact"
+        sensing = f"position errors are at most {error_m:g} m" if error_m else perfect
         if faults and (faults.position_error_m or faults.late):
             sensing = "positions are worse than declared"
         return f"robots arrive from other starts or in reality: arrival is only observed, and {sensing} here"

@@ -45,7 +45,7 @@ OPTIONS: dict[str, Option] = {
     "--engine": option("the compiled loop, of which Drake checks a sample, or Drake alone (default: %(default)s)",
                        choices=("batch", "drake"), default="batch"),
     "--jobs": option("processes (default: one for each processor)", "N", whole(1, MOST_JOBS)),
-    "--json": option("print all of it as JSON"),
+    "--json": option("print everything as JSON"),
     "--limit-steps": option("", "N", positive, default=DEFAULT_LIMITS.work),
     "--seed": option("seed of the decision noise", "N", int),
     "--set": option("override a key of the scenario", "KEY=VALUE", action="append", default=[]),

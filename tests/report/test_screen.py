@@ -204,7 +204,7 @@ def test_safe(edits: list[Edit], mark: str, lines: list[str]) -> None:
         ([away(stands=True)], "partly", ["1 of 2 (as declared)", "r1 stopped"]),
         ([away(stands=True), HELD], "partly", ["1 of 2 (as declared)", "r1 stopped, held by rock and crate"]),
         ([away(stands=True, kept_away={"by": "man"}), HELD], "partly",
-         ["1 of 2 (as declared)", "r1 stopped, man is at its target"]),
+         ["1 of 2 (as declared)", "r1 stopped, man occupies its target"]),
         ([away(stands=True), metric("lost_at_the_end", ["r1"]), HELD, judged("LIVE-GOAL", as_expected=False)], "partly",
          ["1 of 2", "r1 stopped, no way found"]),
         ([away(creeps=True), fault, judged("LIVE-GOAL", as_expected=None)], "partly",
@@ -328,7 +328,7 @@ def test_threshold() -> None:
 def test_seeds_and_paper() -> None:
     rows = [SEED | {"kept": seed < 7, "seed": seed, "min_distance_m": 0.9 - 0.1 * seed} for seed in (1, 2, 7)]
     assert checks("Other seeds?", lambda found: found["seeds"].extend(rows)) == [
-        ("no", "d: distances kept in 2 of 3, all home in 3"),
+        ("no", "d: distances kept in 2 of 3, all arrive in 3"),
         ("", "the worst: r1\N{EN DASH}rock 0.200 < 0.3 m at 4.00 s, run d, seed 7"),
     ]
     statuses = ("reproduced", "calibrated", "calibrated", "not_reproduced")
