@@ -61,9 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.vary is not None:
         return _vary(scenario, options)
     if options.run is not None:
-        return refuse(f"run {options.run!r}: a budget is the same for all runs; wanted: --vary, or no run")
+        return refuse(f"run {options.run!r}: all runs have the same budget; wanted: --vary, or no run")
     if options.output is not None:
-        return refuse("--output draws what --vary finds: it needs --vary")
+        return refuse("--output needs --vary")
     groups = alike(budget(scenario))
     if options.json:
         print(json.dumps([_entry(group) for group in groups], indent=1))

@@ -51,7 +51,7 @@ def parser() -> Parser:
 def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     if options.only is not None and (options.resume or options.stop_when or options.number is not None):
-        return refuse("--only is one draw alone: -n, --resume and --stop-when do not go with it")
+        return refuse("--only excludes -n, --resume and --stop-when")
     one_thread_each()
     from airground_drake.study.campaign.spec import load_spec
 

@@ -55,7 +55,7 @@ def parser() -> Parser:
 def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     if options.limit is not None and options.most is None:
-        return refuse("--limit is of a time: name it with --most")
+        return refuse("--limit needs --most, which names the time")
     one_thread_each()
     from airground_drake.study.campaign.spec import load_spec
 

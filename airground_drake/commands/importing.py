@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             fitting = " and ".join(kind for kind, theirs in FORMATS.items() if key in theirs)
             return refuse(f"--{key.replace('_', '-')} is for {fitting}")
     if options.ugv and options.ugvs:
-        return refuse("--ugvs finds room for UGVs, --ugv names them: use one of the two")
+        return refuse("--ugv and --ugvs exclude each other")
     files.try_to_create(options.output)
     from airground_drake.scenario.load import load
 

@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     bodies = tracks.bodies_of(document, options.uav)
     tracks.known(document, choice, [name for name, _ in (*options.position_error, *options.axes) if name])
     if options.rate_hz and options.time_unit:
-        return refuse("--rate-hz is for times that are numbers of frames, --time-unit for others: use one of the two")
+        return refuse("--rate-hz (for frame numbers) and --time-unit exclude each other")
     log = opening.opened(options.logs, tables.Wanted(bodies, rename, options.map_columns))
     joined = tracks.joined(log, document, choice)
     error_of: dict[str, float] = dict(options.position_error)  # one without a name is of all others

@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     options = parser().parse_args(arguments)
     if options.report and options.record:
-        return refuse("--record goes without DIR: it records the package's theorems")
+        return refuse("--record and DIR exclude each other: the record is of the package's theorems")
     if options.run and not options.report:
         return refuse("--run needs DIR: it names a run of a report")
     try:

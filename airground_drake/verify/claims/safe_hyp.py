@@ -111,12 +111,12 @@ class SafeHyp(TraceClaim):
         "for A if one of two robots may have to stand. Beside an obstacle that may move, the passive law held and the "
         "obstacle was no faster than declared, so d was kept in every period that began at d + V h or more. The "
         "controllers had the scenario's parameters; a controller of the user's own is judged by its steps alone. If "
-        "robots act on measured positions, the inequalities are about measured positions (beside an obstacle that may "
-        "move, about true or measured ones; of two robots that measure each other, about those of one of them), the "
-        "errors were within their bound, and d is about true bodies. If messages between UGVs may be lost, a UGV "
-        "stood unless it knew that the senders of missing messages were far. If UGVs act on old positions "
-        "(`control.law: asynchronous`), each step avoided all points that the other could reach before it decided "
-        "again, up to e, and the two kept d minus the sum of all e."
+        "robots act on measured positions, the inequalities are about these, the errors were within their bound, and d "
+        "is about true bodies. Beside an obstacle that may move, true or measured positions must meet the law; of two "
+        "robots that measure each other, the view of one suffices. If messages between UGVs may be lost, a UGV stood "
+        "unless it knew that the senders of missing messages were far. If UGVs act on old positions (`control.law: "
+        "asynchronous`), each step avoided all points that the other could reach before it decided again, up to e, and "
+        "the two kept d minus the sum of all e."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
