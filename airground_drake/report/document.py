@@ -192,8 +192,8 @@ def _told(item: Mapping[str, Any]) -> str:
     name = " on run ".join(filter(None, (item["id"], item["run"])))
     if "why" in item:
         return f"{name} ({item['why']})"
-    idle = outcome(item["status"], item["exercised"]) == NOT_EXERCISED
-    return f"{name} ({item['status']}{', not tested' * idle}, expected {item['expected']})"
+    tested = "" if outcome(item["status"], item["exercised"]) != NOT_EXERCISED else ", not tested"
+    return f"{name} ({item['status']}{tested}, expected {item['expected']})"
 
 
 def commit() -> str:

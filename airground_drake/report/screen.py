@@ -303,14 +303,15 @@ def _paper(report: Report) -> Iterator[Check]:
     count = Counter[str](row.status for row in report.reproduction)
     match = sum(count[status] for status in rules.MATCHES)
     matches, rest = (
-        ", ".join(f"{count[status]} {says}" for status, says in words.items() if count[status])
+        [f"{count[status]} {says}" for status, says in words.items() if count[status]]
         for words in (rules.MATCHES, rules.REST)
     )
     if not count:
         yield Check("Paper reproduced?", "none", "not a scenario of the paper")
         return
     mark = "yes" if count["reproduced"] == count.total() else "partly" if match else "no"
-    says = f"{match} of {count.total()} numbers match{f' ({matches})' * bool(matches)}{f', {rest}' * bool(rest)}"
+    how = f" ({', '.join(matches)})" if matches else ""
+    says = ", ".join([f"{match} of {count.total()} numbers match{how}", *rest])
     yield Check("Paper reproduced?", mark, says, "reproduction")
 
 
