@@ -54,6 +54,7 @@ class Stream:
     child: str = ""  # frame that the body carries; '' if the source does not say
     clock: str = ""  # what the stamps are: "header stamps", "times of receipt", or the name of a column
     is_file: bool = False  # whether `name` is the stem of a file
+    late_s: float = 0.0  # median of time of receipt less header stamp; 0 if stamps are not those of headers
     counts_frames: bool = False  # whether stamps are numbers of frames, by the name of their column
     skipped: Counter[str] = field(default_factory=Counter)  # rows without a position or a stamp, by the reason
     # Where the first of them is, by the reason: "line 12"; '' if the source has no lines.

@@ -15,6 +15,7 @@ from airground_drake.check.scenario import expected_m_s, robots_of, uavs_of
 from airground_drake.report.sentences import counted
 from airground_drake.study.logs import axes, units
 from airground_drake.study.logs.stream import (
+    HEADERS,
     OF_MESSAGES,
     PER_M,
     RECEIPT,
@@ -40,6 +41,7 @@ CONTRADICTORY = 0.1
 LOST_M, LOST = 0.05, 5.0
 MOST_LEAPS = 0.5  # share of a body's steps that may be leaps
 ORIGIN_M = 1e-3  # robots that start so close to (0, 0) start there
+CLOCKS_S = 0.5  # header stamps that differ by more than messages may take indicate different clocks
 MOST_PASSES = 100  # of a search for rows that are lost
 # Stretches in the order of time that are compared with each other, and rows of one at least.
 MOST_RECORDINGS, FEW = 20, 5
@@ -146,6 +148,16 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     if len(clocks := {stream.clock for stream in streams.values() if stream.clock in OF_MESSAGES}) > 1:
         late = ", ".join(name for name, stream in streams.items() if stream.clock == RECEIPT)
         remarks.append(f"clocks differ: {late} by {RECEIPT}, others by {(clocks - {RECEIPT}).pop()}")
+    late_s = {
+        name: stream.late_s for name, stream in streams.items()
+        if stream.clock == HEADERS and stream.whole.min() >= SINCE_1970_NS  # a simulator has one clock
+    }  # fmt: skip
+    if late_s and (apart_s := max(late_s.values()) - min(late_s.values())) > CLOCKS_S:
+        slow, fast = max(late_s, key=late_s.__getitem__), min(late_s, key=late_s.__getitem__)
+        remarks.append(
+            f"clocks may differ: among messages received together, {HEADERS} of {fast} are {apart_s:.3g} s later than "
+            f"those of {slow}"
+        )
     stamps = {name: stream.ns(stream.time_unit) for name, stream in streams.items()}
     first = min(int(ns.min()) for ns in stamps.values())
     zero = first if first >= SINCE_1970_NS else 0
