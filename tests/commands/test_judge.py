@@ -83,6 +83,7 @@ def test_what_the_package_exports_is_judged_like_the_run(
     if trace is None:
         given = logs.scenario()
         given["safe_distance"]["ugv_m"] = 0.1
+        given["ugvs"]["body"] = given["ugvs"].pop("tb_1")  # as a column of the robot beside it is called
         given["ugvs"]["tb_0"]["plant"] = {"kind": "unicycle", "hand_point_m": 0.1}
         judged_by = (tmp_path / "lab.yaml").as_posix()
         (tmp_path / "lab.yaml").write_text(yaml.safe_dump(given))

@@ -16,6 +16,7 @@ from airground_drake.report.sentences import counted
 from airground_drake.study.logs import axes, units
 from airground_drake.study.logs.stream import (
     HEADERS,
+    OF_BODY,
     OF_MESSAGES,
     PER_M,
     RECEIPT,
@@ -31,8 +32,6 @@ from airground_drake.study.logs.stream import (
 # A body was not recorded where two of its samples are farther apart than this multiple of the usual time between.
 GAP = 2.5
 SINCE_1970_NS = 10**17  # from here on, stamps are since 1970; times are then from the first sample
-# Suffix of a robot's name in this package's tables for its body, if the law steers another point.
-OF_BODY = ".body"
 SAME_M = 1e-9  # positions of one body at one time that differ by less are one
 # Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed.
 CONTRADICTORY = 0.1
