@@ -202,6 +202,9 @@ def test_a_folder_may_have_other_files_and_a_log_that_cannot_be_read_is_told(
         logs.read(tmp_path, document)
     with pytest.raises(LogError, match=r"README\.md: "):
         logs.read(tmp_path / "README.md", document)
+    (tmp_path / "tb_0.csv").write_bytes(b"")
+    with pytest.raises(LogError, match=r"no file of the folder is a log: .*README\.md: .*tb_0\.csv: .* and 1 more$"):
+        logs.read(tmp_path, document)
 
 
 def test_a_log_of_one_instant_is_refused(tmp_path: Path, document: dict[str, Any]) -> None:
