@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 USUAL = {"_s": (0.0, 0.1, 0.3, 1.0), "_m": (0.0, 0.02, 0.05, 0.1), "": (0.0, 0.1, 0.5)}
 PROMISED, LAW, OLD = "promised_m", "law_m", "old_positions_m"  # columns about a kind of pair
 MEANING = "metres, by kind of pair: the distance promised between surfaces -> the distance that the law keeps"
-MEANING_OF_OLD = "; + the way of the other one: nearer than both, two UGVs may only part"
+MEANING_OF_OLD = "; + how far the other UGV may have driven: within this sum two UGVs may only separate"
 EXIT_UNDECIDED = 3
 MOST_NAMED = 6  # bodies that are named in a line at most
 
@@ -41,9 +41,9 @@ def parser() -> Parser:
         {
             "scenario": None,
             "run": "with --vary (default: all runs)",
-            "--json": "print all of it as JSON",
-            "--vary": option("a key, such as channel.delay_s=0,0.1,0.3; without values some usual ones", "KEY=VALUES"),
-            "-o --output": option("with --vary: draw it, too, as SVG", "FILE", output_file),
+            "--json": "print everything as JSON",
+            "--vary": option("values of a key: channel.delay_s=0,0.1,0.3 (default: usual values)", "KEY=VALUES"),
+            "-o --output": option("with --vary: also draw the results, as SVG", "FILE", output_file),
             "--jobs": None,
             "--set": None,
             plugins.OPTION: None,
@@ -61,9 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.vary is not None:
         return _vary(scenario, options)
     if options.run is not None:
-        return refuse(f"run {options.run!r}: a budget is the same for all runs; wanted: --vary, or no run")
+        return refuse(f"run {options.run!r}: all runs have the same budget; wanted: --vary, or no run")
     if options.output is not None:
-        return refuse("--output draws what --vary finds: it needs --vary")
+        return refuse("--output needs --vary")
     groups = alike(budget(scenario))
     if options.json:
         print(json.dumps([_entry(group) for group in groups], indent=1))
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"    {term.key}{owner}: {term.metres:.4f} m")
         if pair.unsure_m:
             near_m = pair.gap_m + pair.unsure_m
-            print(f"    old positions: within {near_m:.3f} m they may only part; farther while messages are lost")
+            print(f"    old positions: within {near_m:.3f} m they may only separate; more while messages are lost")
         if pair.start:
             print(f"    promised only with {pair.start}")
     return 0

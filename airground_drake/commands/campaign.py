@@ -30,28 +30,28 @@ def parser() -> Parser:
     return parser_of("campaign", "Simulate and judge many draws of a scenario, and bound how likely a violation is.", {
         "spec": "YAML file: a scenario, and distributions over its keys",
         "-n --number": "draws (default: one, or all combinations of grids)",
-        "-o --output": "a new folder, or with --resume an old one (default: campaigns/<name>); with --only: the "
-        "scenario's file",
-        "--resume": "go on with what the folder has",
-        "--only": option("this draw alone; its scenario is written", "INDEX", whole(0, MAX_SEED)),
+        "-o --output": "new folder (default: campaigns/<name>); with --resume: that of the campaign; with --only: file "
+        "of the scenario",
+        "--resume": "continue the campaign in this folder",
+        "--only": option("make only this draw, and write its scenario", "INDEX", whole(0, MAX_SEED)),
         "--engine": None,
         "--jobs": None,
         "-q --quiet": None,
-        "--scheduler": option("of a Dask cluster, such as tcp://host:8786", "ADDRESS"),
+        "--scheduler": option("use this Dask cluster, such as tcp://host:8786", "ADDRESS"),
         "--stop-when": option("end when the anytime-valid bound meets RULE: 'SAFE-TRACE < 1e-2'", "RULE"),
-        "--limit-steps": "a draw with more simulated steps, counted per robot, over all runs, is invalid "
+        "--limit-steps": "count a draw with more simulated steps, summed over robots and runs, as invalid "
         "(default: %(default).0g)",
         "--limit-time": option("stop a draw that takes longer (default: %(default)g)", "S", positive,
                                default=DEFAULT_LIMITS.time),
         plugins.OPTION: None,
     }, "exit codes: 0 every claim as expected in every draw, 1 one differs, 2 usage, bad spec or folder, 3 undecided, "
-        "4 tool error, 130 and 143 interrupted; what is finished is kept: --resume goes on with it")  # fmt: skip
+        "4 tool error, 130 and 143 interrupted; --resume continues an interrupted campaign")  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     if options.only is not None and (options.resume or options.stop_when or options.number is not None):
-        return refuse("--only is one draw alone: -n, --resume and --stop-when do not go with it")
+        return refuse("--only excludes -n, --resume and --stop-when")
     one_thread_each()
     from airground_drake.study.campaign.spec import load_spec
 

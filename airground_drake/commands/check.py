@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from airground_drake.base.errors import short
@@ -33,27 +34,27 @@ NEEDED = ("files", "trace")
 EXIT_UNUSABLE = 2  # exit code of `airground prove` without Coq, or with a report that it cannot read
 # Parts that are taken as recorded: a consistent change of these is not detected.
 ALWAYS = (
-    "what the scenario asks for and expects; number of seeds; provenance, measured times; "
-    "metadata of tables; Coq's version and words; findings of `report audit` that rest on other runs"
+    "the scenario and its expectations; number of seeds; provenance, measured times; metadata of tables; "
+    "Coq's version and messages; findings of `report audit` that rest on other runs"
 )
 # Parts that are taken as recorded without `--simulate`.
 NOT_SIMULATED = "policies, seeds and faults; messages and decisions; other seeds, third-party claims, block diagram"
 EPILOG = f"""\
-Each line says what was checked, on which run, and by whom:
+Each line says what was checked, on which run, and by which program:
   (checker)           a separate program: distances, hypotheses, triggers, dwell, arrivals, collisions, digests
   (made again)        the report from its recorded traces, by its own code: claims, numbers, pages, figures
   (simulated again)   with --simulate, within the size limits of `airground report`: every run, other seeds,
                       third-party claims, the block diagram
   (Coq)               with --coq: the distances of every run, proved in a temporary copy; proofs.json beside them
-and what came out:
-  agrees              the files bear out what the report says
+and with which outcome:
+  agrees              the report follows from its files
   DISAGREES           the files contradict the report or each other: the rule, the time, both values
   cannot be checked   a file cannot be read, or something is not allowed or too large
   as recorded         nothing to compare with, such as third-party claims without --simulate --allow-plugins
-  not reproduced here the simulation gives another run; the first row that differs. Honest runs differ, too, on
-                      other processors and with other versions of libraries, so this alone proves nothing.
-Taken as recorded, so that a forger may change it in all its places, unnoticed:
-  always              {ALWAYS}
+  not reproduced here the simulation gives another run; the first row that differs. Another processor or
+                      version of a library can cause this, so it alone proves no forgery.
+Not checked, so a consistent change of these is not noticed:
+  always              {fill(ALWAYS, 96, subsequent_indent=" " * 22)}
   without --simulate  {NOT_SIMULATED}
 Exit codes: 0 all agree; 1 not all; 2 usage, or no report; 3 not reproduced here; 4 a fault of the checker."""
 

@@ -26,19 +26,19 @@ _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 def parser() -> Parser:
     return parser_of(
         "compare",
-        "What differs between two reports: first what they were made from (keys of the scenario, versions), then "
-        "verdicts, margins, what was exercised, events. Changes by rounding are counted, not listed.",
+        "List the differences of two reports: keys of the scenario and versions, then verdicts, margins, counts of "
+        "tests, events. Changes by rounding are only counted.",
         {
             "before": option("folder of a report", "BEFORE", Path),
-            "after": option("folder of another", "AFTER", Path),
+            "after": option("folder of another report", "AFTER", Path),
             "--json": None,
             "--html": option("write a page", "FILE", output_file),
             "--exact": "exit code 1 if any result differs, to the last digit",
         },
         "verdicts from the best to the worst: "
-        + "; ".join(", ".join(alike) for alike in compare.ORDER).replace("_", " ")
-        + ". One that was as expected and is no longer is worse, too. Exit codes: 0 nothing is worse than before, 1 "
-        "something is (with --exact: any result differs), 2 usage, or a folder is not a report.",
+        + "; ".join(map(", ".join, compare.ORDER)).replace("exercised", "tested").replace("_", " ")
+        + ". A verdict that is no longer the expected one is worse, too. Exit codes: 0 nothing got worse, 1 "
+        "something did (with --exact: any result differs), 2 usage, or a folder is not a report.",
     )
 
 

@@ -15,8 +15,8 @@ FORMATS = ("dot", "svg", "pdf", "png")
 def parser() -> Parser:
     return parser_of("diagram", "Draw the diagram of a scenario.", {
         "scenario": None,
-        "--method": option("default: c, the paper's Figure 2, if it has such a run", choices=tuple(METHODS)),
-        "--part": option("only the layer of that name, with all ports", "NAME"),
+        "--method": option("default: c (the paper's Figure 2) if a run has it", choices=tuple(METHODS)),
+        "--part": option("draw only this layer, with all ports", "NAME"),
         "--format": option("may be repeated (default: dot and svg)", action="append", choices=FORMATS),
         "-o --output": {"default": Path()},
         "--set": None,

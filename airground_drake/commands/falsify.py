@@ -1,4 +1,4 @@
-"""`airground falsify SPEC --claim ID`: search for a scenario that violates a claim, and shrink it."""
+"""`airground falsify SPEC --claim ID`: search for a scenario that violates a claim, and minimise it."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ TIMES = tuple(name for name in COLUMNS if name.endswith("_s") and name not in ("
 
 
 def parser() -> Parser:
-    return parser_of("falsify", "Search the space of a campaign for a scenario that violates a claim, and shrink it.", {
+    return parser_of("falsify", "Search the draws of a campaign for a violation of a claim, and minimise it.", {
         "spec": None,
         "--claim": option("claim about runs (default: %(default)s)", "ID", default=DISTANCES),
         "--most": option("maximise this time instead of minimising a margin", choices=TIMES),
         "--limit": option("with --most: a longer time is a counterexample", "S", positive),
         "--sampler": option(f"{', '.join(SAMPLERS.allowed)} (default: %(default)s)", "NAME", default="cma"),
         "-n --number": {"help": "scenarios to try (default: %(default)s)", "default": 200},
-        "--shrink": option("runs for shrinking a counterexample (default: %(default)s)", "N", whole(0), default=300),
-        "-o --output": option("new; without a counterexample, the scenario nearest to one (default: "
-                              "<name>_<sampler>.yaml, written only for a counterexample)", "FILE", output_file),
+        "--shrink": option("runs for minimising a counterexample (default: %(default)s)", "N", whole(0), default=300),
+        "-o --output": option("new file for the counterexample, or else for the scenario nearest to one (default: "
+                              "<name>_<sampler>.yaml, only for a counterexample)", "FILE", output_file),
         "--engine": None,
         "--jobs": None,
         "-q --quiet": None,
@@ -55,7 +55,7 @@ def parser() -> Parser:
 def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     if options.limit is not None and options.most is None:
-        return refuse("--limit is of a time: name it with --most")
+        return refuse("--limit needs --most, which names the time")
     one_thread_each()
     from airground_drake.study.campaign.spec import load_spec
 

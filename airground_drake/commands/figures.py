@@ -16,7 +16,7 @@ def parser() -> Parser:
     says = "Write the figures of a report as files, figures.tex with captions, and tables in LaTeX."
     return parser_of("figures", says, {
         "folder": None,
-        "--style": option("type and width (default: ieee)", choices=STYLES, default="ieee"),
+        "--style": option("fonts and widths (default: ieee)", choices=STYLES, default="ieee"),
         "--format": option(f"comma-separated: {','.join(FORMATS)} (default: pdf)", kind=formats_of(FORMATS),
                            default=("pdf",)),
         "-o --output": {"help": "default: figures", "metavar": "FOLDER", "default": Path("figures")},

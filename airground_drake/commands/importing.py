@@ -36,24 +36,23 @@ def parser() -> Parser:
     radii = ", ".join(f"{kind} {radius:g}" for kind, radius in RADII_M.items())
     return parser_of(
         "import",
-        "Make a scenario of a Gazebo world of cylinders and boxes such as BARN's, of a ROS map, or of a benchmark of "
-        "MovingAI with its map.",
+        "Make a scenario from a Gazebo world such as BARN's, a ROS map, or a benchmark of MovingAI with its map.",
         {
-            "format": option("what FILE is", choices=tuple(FORMATS)),
+            "format": option("kind of FILE", choices=tuple(FORMATS)),
             "file": option("barn: NAME.world; ros-map: the map's YAML file; mapf: NAME.scen", "FILE", Path),
             "-o --output": option("default: %(default)s", "YAML", output_file, default=Path("scenario.yaml")),
             "--ugv": option("barn, ros-map: a UGV with its start and target in m; may be repeated (default for barn: "
                             "the challenge's)", "NAME:X,Y:X,Y", _ugv, action="append"),
-            "--ugvs": option(f"ros-map: UGVs to find room for (default: {UGVS})", "N", whole(1, MAX_UGVS)),
+            "--ugvs": option(f"ros-map: number of UGVs (default: {UGVS})", "N", whole(1, MAX_UGVS)),
             "--radius-m": option(f"barn, ros-map: radius of UGVs (default: {radii})", "R", size),
-            "--distance-m": option("barn, ros-map: what UGVs keep from obstacles and from one another (default: "
+            "--distance-m": option("barn, ros-map: safe distance of UGVs (default: "
                                    f"{DISTANCE_M:g})", "D", size),
             "--max-speed-m-s": option("largest speed of UGVs; presets have two thirds of it (default: 1.5, less for "
                                       "the smallest UGVs)", "V", between(0.01, 50.0)),
             "--height-m": option("barn: height of UGVs; shapes that begin above it are left out (default: "
                                  f"{HEIGHT_M:g})", "H", size),
             "--agents": option(f"mapf: the first N agents (default: {AGENTS})", "N", whole(1, MAX_UGVS)),
-            "--map": option("mapf: the map (default: as FILE says, beside it)", "FILE", Path),
+            "--map": option("mapf: the map (default: as FILE names it, in its folder)", "FILE", Path),
             "--cell-m": option(f"mapf: side of a cell (default: {CELL_M:g})", "M", between(0.1, 100.0)),
         },
     )  # fmt: skip
@@ -66,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             fitting = " and ".join(kind for kind, theirs in FORMATS.items() if key in theirs)
             return refuse(f"--{key.replace('_', '-')} is for {fitting}")
     if options.ugv and options.ugvs:
-        return refuse("--ugvs finds room for UGVs, --ugv names them: use one of the two")
+        return refuse("--ugv and --ugvs exclude each other")
     files.try_to_create(options.output)
     from airground_drake.scenario.load import load
 

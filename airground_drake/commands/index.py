@@ -22,8 +22,8 @@ MARK = "airground_drake index"  # text in every page that this command has writt
 
 
 def parser() -> Parser:
-    says = f"Write DIR/{PAGE}, which lists the reports below DIR and leads to them."
-    return parser_of("index", says, {"folder": "folder with folders of reports in it"})
+    says = f"Write DIR/{PAGE}, a page that links to the reports in DIR."
+    return parser_of("index", says, {"folder": "folder that contains folders of reports"})
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

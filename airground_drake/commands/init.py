@@ -21,7 +21,7 @@ def parser() -> Parser:
         "file": option("default: %(default)s", kind=output_file, nargs="?", default=Path("scenario.yaml")),
         "--like": option("copy this shipped scenario instead", "NAME", choices=shipped_files()),
         "--fleet": option("N UGVs that cross a field of obstacles instead", "N", whole(1, MAX_UGVS)),
-        "--obstacles": option("with --fleet: obstacles (default: 5 a UGV)", "M", whole(1, MOST_OBSTACLES)),
+        "--obstacles": option("with --fleet: number of obstacles (default: 5 per UGV)", "M", whole(1, MOST_OBSTACLES)),
         "--seed": option("with --fleet: seed (default: 1)", "S", whole(0, MAX_SEED)),
     })  # fmt: skip
 

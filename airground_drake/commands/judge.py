@@ -13,7 +13,7 @@ from airground_drake.scenario.options import Parser, option, parser_of
 
 MOST_GAP_S, MOST_ERROR_M = 1e6, 1e6
 EPILOG = """\
-what a LOG can be, found by its content:
+formats of LOG, detected from the content:
   CSV, TSV     a row per body and time (t_s, body, x_m, y_m, z_m), or columns for each body (tb1_x, /tb1/odom/.../x),
                or a file per body (tb1.csv); header lines, decimal commas, epoch stamps, ns, ms and mm are noticed
   TUM, Parquet
@@ -22,9 +22,9 @@ what a LOG can be, found by its content:
   a folder     of any of these
 `airground export` writes logs that can be judged, too.
 
-the scenario says who the robots are, how large they are, where obstacles stand, and which distances are to be kept.
-What matters here: ugvs and uav (start_m, radius_m, max_speed_m_s), obstacles, arena_m, map, safe_distance, duration_s
-and control.avoidance_gain_1_s. `airground init` writes one to start from.
+the scenario gives the robots, their sizes, the obstacles and the required distances. These keys are used: ugvs and
+uav (start_m, radius_m, max_speed_m_s), obstacles, arena_m, map, safe_distance, duration_s and
+control.avoidance_gain_1_s. `airground init` writes one to start from.
 
 examples:
   airground judge run3.csv --scenario lab.yaml
@@ -33,7 +33,7 @@ examples:
   airground judge log.csv --scenario lab.yaml --map-columns t=clock,body=who,x_mm=east,y_mm=north
 
 exit codes: 0 no distance is broken where the log covers it (the first line says if it does not cover all), 1 one is
-broken, or the position error decides, 2 usage, or a log that cannot be used
+broken, or the position error leaves it open, 2 usage, or a log that cannot be used
 """
 
 
@@ -41,31 +41,31 @@ def parser() -> Parser:
     several: dict[str, Any] = {"action": "append", "default": []}
     return parser_of(
         "judge",
-        "Judge the log of an experiment: which distances were kept, by which margin, whose doing an approach was, and "
-        "which hypotheses of the safety theorem held.",
+        "Judge the log of an experiment: which distances were kept, by which margin, which robot caused an approach, "
+        "and which hypotheses of the safety theorem held.",
         {
             "logs": option("a file or folder; several are one log", "LOG", Path, nargs="+"),
             "--scenario": option("name of a shipped scenario, or path to a YAML file", "NAME", required=True),
             "--set": None,
-            "--rename": option("a topic, frame, column or value in the log, and the body of the scenario that it is "
-                               "about", "NAME=BODY", _named, **several),
+            "--rename": option("a topic, frame, column or value in the log, and its body in the scenario",
+                               "NAME=BODY", _named, **several),
             "--map-columns": option("names of the columns t, body, frame, x, y, z of a table, with a unit where needed "
                                     "(x_mm=NAME); {body} in a NAME stands for a body's name", "t=NAME,...", _mapped,
                                     default={}),
-            "--frame": option("use positions in this frame only; several FRAMEs are taken as one", "FRAME", **several),
-            "--time-unit": option("of times without a unit", choices=("s", "ms", "us", "ns"), default=""),
-            "--length-unit": option("of lengths without a unit", choices=("m", "cm", "mm"), default=""),
-            "--rate-hz": option("frames per second of times that are numbers of frames", "HZ", between(1e-3, 1e6),
+            "--frame": option("use positions in this frame only; several FRAMEs count as one", "FRAME", **several),
+            "--time-unit": option("unit of times without one", choices=("s", "ms", "us", "ns"), default=""),
+            "--length-unit": option("unit of lengths without one", choices=("m", "cm", "mm"), default=""),
+            "--rate-hz": option("frames per second, if times are frame numbers", "HZ", between(1e-3, 1e6),
                                 default=0.0),
-            "--axes": option("which axes of the log are x, y and z (up) of the scenario: y,x,-z for NED, such as "
-                             "x,-z,y if y is up (default: x,y,z; asked for if they seem to be others)", "[BODY=]AXES",
+            "--axes": option("axes of the log that are x, y and z (up) of the scenario: y,x,-z for NED, x,-z,y "
+                             "if y is up (default: x,y,z, unless the log contradicts this)", "[BODY=]AXES",
                              _axes, **several),
-            "--gap": option("nothing is claimed between two positions of a body that are farther apart than this "
-                            "(default: 2.5 times the body's usual time between two); closer ones are joined by a "
-                            "straight line", "S", between(0.0, MOST_GAP_S), default=0.0),
-            "--position-error": option("by how much recorded positions may be wrong", "[BODY=]M", _error, **several),
-            "--uav": option("one more UAV, like the scenario's", "NAME", **several),
-            "--without": option("a body of the scenario that is not to be judged", "BODY", **several),
+            "--gap": option("least time between two positions of a body that counts as a gap, which the verdict does "
+                            "not cover (default: 2.5 times the body's usual interval)", "S",
+                            between(0.0, MOST_GAP_S), default=0.0),
+            "--position-error": option("largest error of recorded positions", "[BODY=]M", _error, **several),
+            "--uav": option("another UAV, like the scenario's", "NAME", **several),
+            "--without": option("do not judge this body of the scenario", "BODY", **several),
             "-o --output": "also write a page with maps, judged.html, and a replay, replay.html",
             "--json": None,
         },
@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     bodies = tracks.bodies_of(document, options.uav)
     tracks.known(document, choice, [name for name, _ in (*options.position_error, *options.axes) if name])
     if options.rate_hz and options.time_unit:
-        return refuse("--rate-hz is for times that are numbers of frames, --time-unit for others: use one of the two")
+        return refuse("--rate-hz (for frame numbers) and --time-unit exclude each other")
     log = opening.opened(options.logs, tables.Wanted(bodies, rename, options.map_columns))
     joined = tracks.joined(log, document, choice)
     error_of: dict[str, float] = dict(options.position_error)  # one without a name is of all others

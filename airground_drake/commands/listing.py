@@ -25,9 +25,9 @@ Lines = Iterator[tuple[str, str]]  # names and their descriptions
 
 def parser() -> Parser:
     return parser_of("list", f"List {__doc__.partition(': ')[2]}", {
-        "kind": option("default: all of them but the keys", nargs="?", choices=(*KINDS, KEYS)),
-        "name": option("a name, or the beginning of a key: all about it", "NAME", nargs="?"),
-        "--schema": "the JSON Schema of scenario files instead, for editors",
+        "kind": option("default: all kinds except keys", nargs="?", choices=(*KINDS, KEYS)),
+        "name": option("print all about this name, or about keys that begin with it", "NAME", nargs="?"),
+        "--schema": "print the JSON Schema of scenario files, for editors",
     })  # fmt: skip
 
 

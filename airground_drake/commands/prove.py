@@ -21,8 +21,8 @@ EXIT_UNPROVED = 1
 def parser() -> Parser:
     return parser_of(
         "prove",
-        "Have the proof checker Coq check the package's theorems (without DIR), or prove for the runs of a report that "
-        "they keep their distances (with DIR).",
+        "Let Coq check the package's theorems (without DIR), or prove that the runs of a report keep their distances "
+        "(with DIR).",
         {
             "report": option("folder of a report", "DIR", Path, nargs="?"),
             "--run": option("prove only this run of DIR, even if the scenario does not expect it to pass; may be "
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     options = parser().parse_args(arguments)
     if options.report and options.record:
-        return refuse("--record goes without DIR: it records the package's theorems")
+        return refuse("--record and DIR exclude each other: the record is of the package's theorems")
     if options.run and not options.report:
         return refuse("--run needs DIR: it names a run of a report")
     try:

@@ -20,7 +20,7 @@ def parser() -> Parser:
         "-o --output": {"help": "folder for the pages, or a name.html for RUN (default: .)", "metavar": "PLACE",
                         "default": Path()},
         "--video": option("write RUN as a video instead: .webp or .mp4", "FILE", output_file),
-        "--speed": option(f"with --video: its speed (default: {SPEED:g})", "X", between(SLOWEST, FASTEST)),
+        "--speed": option(f"with --video: speed of the video (default: {SPEED:g})", "X", between(SLOWEST, FASTEST)),
     }, exclusive=("-o --output", "--video"))  # fmt: skip
 
 

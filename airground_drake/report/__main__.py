@@ -119,14 +119,14 @@ def _findings(
 
 def parser() -> Parser:
     return parser_of("report", "Simulate all runs of a scenario, check the claims on them, and write the report.", {
-        "scenario": {"nargs": "?", "help": "name of a shipped scenario, path to a YAML file, or audit"},
+        "scenario": {"nargs": "?", "help": "name of a shipped scenario, path to a YAML file, or audit (of the paper)"},
         "-o --output": f"default: reports/<scenario>; {folder.RULE}",
         "--format": option("comma-separated: html,json,junit (default: all)", kind=formats_of(FORMATS),
                            default=FORMATS),
         "--set": None,
         "--seed": None,
-        "--seeds": option("also simulate every run with the seeds 1 to N, and say how many keep all distances and "
-                          "bring all home", "N", whole(1), default=0),
+        "--seeds": option("also simulate every run with the seeds 1 to N, and count those with which all distances "
+                          "are kept, and those with which all robots arrive", "N", whole(1), default=0),
         "--no-cache": "repeat experiments about the model instead of reusing earlier results",
         plugins.OPTION: None,
         plugins.SHOW: None,

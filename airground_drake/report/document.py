@@ -193,7 +193,7 @@ def _told(item: Mapping[str, Any]) -> str:
     if "why" in item:
         return f"{name} ({item['why']})"
     idle = outcome(item["status"], item["exercised"]) == NOT_EXERCISED
-    return f"{name} ({item['status']}{', nothing to check' * idle}, expected {item['expected']})"
+    return f"{name} ({item['status']}{', not tested' * idle}, expected {item['expected']})"
 
 
 def commit() -> str:

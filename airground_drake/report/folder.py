@@ -15,7 +15,7 @@ from airground_drake.base.errors import FolderError
 
 # The formats of a report, and the file of each.
 PAGES = {"html": "report.html", "json": "report.json", "junit": "junit.xml"}
-RULE = "allowed: a folder that is new or empty, has a report.json of ours, or nothing but files of a report"
+RULE = "it must be new, empty, or hold an earlier report, which is replaced"
 
 _FILES = re.compile(
     r"report\.html|report\.json|junit\.xml|diagram\.dot|diagram\.svg"

@@ -12,11 +12,9 @@ from airground_drake.sim.trace import Trace
 from airground_drake.ugv.reasons import OVER
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.runs.control_law import inequalities_of
+from airground_drake.verify.runs.control_law import BINDING_M_S, inequalities_of
 from airground_drake.verify.runs.gate_record import DecisionRecord, rows_of
 from airground_drake.verify.runs.proposals import ProposalRecord, proposals_of, row_at
-
-BINDING_M_S = 1e-9  # an avoidance inequality binds where a command has less to spare, m/s
 
 
 def interventions(trace: Trace) -> list[dict[str, Any]]:

@@ -47,7 +47,7 @@ def _case(suite: ET.Element, scenario: str, run: str, claim: str) -> ET.Element:
 
 def _outcome(case: ET.Element, claim: Claim) -> None:
     idle = outcome(claim.status, claim.exercised) == NOT_EXERCISED
-    status = f"{claim.status}, nothing to check (0 {claim.exercised_by})" if idle else claim.status
+    status = f"{claim.status}, not tested (0 {claim.exercised_by})" if idle else claim.status
     if claim.as_expected is not False:
         skipped = f"{status}, nothing promised" if claim.as_expected is None else status if idle else ""
         if skipped:

@@ -16,8 +16,9 @@ def distance(value_m: float, required_m: float) -> str:
     return f"{apart} (overlap)" if apart.startswith("-") else apart
 
 
-def metres(value_m: float, required_m: float, decimals: int = 3) -> str:
+def metres(value_m: float, required_m: float) -> str:
     """A distance; if it falls short, with enough decimals to show a smaller number than the required one."""
+    decimals = 3
     while value_m < required_m - SLACK_M and float(f"{value_m:.{decimals}f}") >= required_m and decimals < 9:
         decimals += 1
     return f"{round(value_m, decimals) + 0.0:.{decimals}f} m"  # + 0.0: no -0.000

@@ -207,7 +207,7 @@ def _uav(run: RunFacts) -> Cell:
         lines.append(f"policy failed {counted(failed, 'time')}")
     messages = run.run.metrics.messages
     if messages and (took := messages.proposals + messages.withdrawals + messages.answers):
-        lines.append(f"{counted(took, 'message')} (always-on {sum(messages.always_on.values())})")
+        lines.append(f"{counted(took, 'message')} ({sum(messages.always_on.values())} if always on)")
     return Cell("", lines)
 
 
@@ -222,7 +222,7 @@ def _seeds(report: Report) -> Iterator[Check]:
     )
     for (kept, home, count), names in by_outcome.items():
         mark = "no" if kept < count else "partly" if home < count else "yes"
-        says = f"{', '.join(names)}: distances kept in {kept} of {count}, all home in {home}"
+        says = f"{', '.join(names)}: distances kept in {kept} of {count}, all arrive in {home}"
         yield Check("Other seeds?", mark, says)
         if kept < count:
             worst = min((seed for name in names for seed in of_runs[name]), key=lambda seed: seed.margin_m)
@@ -302,12 +302,15 @@ def _verdict(those: Iterable[Claim]) -> str:
 def _paper(report: Report) -> Iterator[Check]:
     count = Counter[str](row.status for row in report.reproduction)
     match = sum(count[status] for status in rules.MATCHES)
-    counts = [f"{count[status]} {says}" for status, says in {**rules.MATCHES, **rules.REST}.items() if count[status]]
+    matches, rest = (
+        ", ".join(f"{count[status]} {says}" for status, says in words.items() if count[status])
+        for words in (rules.MATCHES, rules.REST)
+    )
     if not count:
         yield Check("Paper reproduced?", "none", "not a scenario of the paper")
         return
     mark = "yes" if count["reproduced"] == count.total() else "partly" if match else "no"
-    says = f"{match} of {count.total()} numbers match: {', '.join(counts)}"
+    says = f"{match} of {count.total()} numbers match{f' ({matches})' * bool(matches)}{f', {rest}' * bool(rest)}"
     yield Check("Paper reproduced?", mark, says, "reproduction")
 
 
@@ -333,8 +336,8 @@ def _real(report: Report) -> str:
     if not own:
         given = report.scenario.resolved
         error_m, faults = given.position_error_m, given.faults
-        perfect = "sensing is perfect" if given.ugv_links is None else "positions heard are exact"
-        sensing = f"errors of positions are at most {error_m:g} m" if error_m else perfect
+        perfect = "sensing is perfect" if given.ugv_links is None else "received positions are exact"
+        sensing = f"position errors are at most {error_m:g} m" if error_m else perfect
         if faults and (faults.position_error_m or faults.late):
             sensing = "positions are worse than declared"
         return f"robots arrive from other starts or in reality: arrival is only observed, and {sensing} here"

@@ -42,16 +42,16 @@ OPTIONS: dict[str, Option] = {
     "-n --number": option("", "N", whole(1)),
     "-o --output": option("default: this folder", "DIR", output_folder),
     "-q --quiet": option("no progress"),
-    "--engine": option("who makes the runs: a compiled loop, which Drake checks, or Drake alone (default: %(default)s)",
+    "--engine": option("the compiled loop, of which Drake checks a sample, or Drake alone (default: %(default)s)",
                        choices=("batch", "drake"), default="batch"),
     "--jobs": option("processes (default: one for each processor)", "N", whole(1, MOST_JOBS)),
-    "--json": option("print all of it as JSON"),
+    "--json": option("print everything as JSON"),
     "--limit-steps": option("", "N", positive, default=DEFAULT_LIMITS.work),
     "--seed": option("seed of the decision noise", "N", int),
     "--set": option("override a key of the scenario", "KEY=VALUE", action="append", default=[]),
-    plugins.OPTION: option("import and run what is named as module:Class or file.py:Class; looked for beside the "
-                           "scenario or spec, too"),
-    plugins.SHOW: option("pass on what third-party policies print, to standard error"),
+    plugins.OPTION: option("import and run third-party code (module:Class or file.py:Class), also from the folder "
+                           "of the scenario or spec"),
+    plugins.SHOW: option("print the output of third-party policies on standard error"),
 }  # fmt: skip
 
 

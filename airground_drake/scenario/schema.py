@@ -402,7 +402,7 @@ class Threshold:
 
 @dataclass(slots=True)
 class Decision:
-    """DDM (15) and event trigger: 'automaton' (hysteresis, minimum inter-event time) or 'bare' (the paper's)."""
+    """Drift-diffusion (15) and trigger: 'automaton' (hysteresis, minimum inter-event time) or the paper's 'bare'."""
 
     threshold: Threshold = field(default_factory=Threshold)
     """The decision threshold zeta."""

@@ -60,13 +60,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _line(verdict: Verdict) -> str:
-    finding = verdict
     name = f"{verdict.claim.id} {verdict.run}" if verdict.run else verdict.claim.id
-    margin = "" if finding.margin is None else f", margin {finding.margin:.6g} {finding.unit}".rstrip()
-    of = f" ({finding.quantity})" if margin and finding.quantity else ""
-    idle = outcome(finding.status, finding.exercised) == NOT_EXERCISED
-    status = f"{finding.status}, nothing to check" if idle else finding.status
-    tested = f" [{finding.exercised} {verdict.claim.exercised_by}]" if finding.exercised is not None else ""
+    margin = "" if verdict.margin is None else f", margin {verdict.margin:.6g} {verdict.unit}".rstrip()
+    of = f" ({verdict.quantity})" if margin and verdict.quantity else ""
+    idle = outcome(verdict.status, verdict.exercised) == NOT_EXERCISED
+    status = f"{verdict.status}, not tested" if idle else verdict.status
+    tested = f" [{verdict.exercised} {verdict.claim.exercised_by}]" if verdict.exercised is not None else ""
     expected = {True: "", False: f", expected {verdict.expected}", None: ", nothing promised"}[verdict.as_expected]
     return f"{name}: {status}{margin}{of}{tested}{expected}"
 

@@ -57,7 +57,7 @@ class ArrayJudges:
         given, world = batch.given, batch.world
         robots = world.bodies[: len(world.robots)]
         if any(type(robot.plant) is not FirstOrder for robot in robots):
-            raise NoScreenError("a robot that does not move as it is told")
+            raise NoScreenError("a robot that does not follow its commands exactly")
         if any(body.appears_s > 0.0 or body.disappears_s < np.inf for body in world.bodies):
             raise NoScreenError("an obstacle that appears or disappears")
         self._batch, self._given, self._world = batch, given, world

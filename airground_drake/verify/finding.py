@@ -1,6 +1,5 @@
 """The result of a check: status, margin, evidence, chart."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
@@ -9,9 +8,6 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.statuses import Status
-
-PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
-"""A file name that stays in its folder, on any system."""
 
 
 @dataclass(frozen=True)

@@ -17,17 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.hostile_policies import KINDS
-from check.forgeries import (
-    RULES,
-    all_of,
-    both,
-    claim,
-    everywhere,
-    leap,
-    report,
-    rows,
-    words,
-)
+from check.forgeries import RULES, all_of, both, claim, everywhere, leap, report, rows, words
 from check.forging import (
     RUN,
     UGV,

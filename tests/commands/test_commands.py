@@ -196,15 +196,15 @@ index .                                 # there are no reports
 index nowhere                           # there are no reports
 prove . --run z                         #
 prove --run z                           # --run needs DIR
-prove report --record                   # --record goes without DIR
+prove report --record                   # --record and DIR exclude each other
 campaign                                # the following arguments are required: spec
 campaign .                              #
 campaign minimal                        # no such file; wanted: the path of a campaign
 campaign spec.yaml -n 0                 # a whole number from 1 on
 campaign spec.yaml -n 99999999999999999999 # allowed: 4e+06 rows, one for each draw, run and claim
 campaign spec.yaml --only -1            # a whole number from 0 to 2147483647
-campaign spec.yaml --only 2 --resume    # --only is one draw alone
-campaign spec.yaml --only 2 -n 3        # --only is one draw alone
+campaign spec.yaml --only 2 --resume    # --only excludes -n
+campaign spec.yaml --only 2 -n 3        # --only excludes -n
 campaign spec.yaml --only 2 -o mine.txt # mine.txt exists; name a file that does not
 campaign spec.yaml --only 2 -o mine.txt/one.yaml # cannot be written
 campaign spec.yaml -n 2 --jobs 1000000  # a whole number from 1 to 1000
@@ -216,7 +216,7 @@ campaign spec.yaml --stop-when COMMA<.1 # unknown claim that is judged 'COMMA'
 falsify spec.yaml -n x                  # a whole number from 1 on
 falsify spec.yaml --shrink -1           # a whole number from 0 on
 falsify spec.yaml --jobs 0              # a whole number from 1 to 1000
-falsify spec.yaml --limit 1             # --limit is of a time: name it with --most
+falsify spec.yaml --limit 1             # --limit needs --most
 falsify spec.yaml --most intervened_s --limit 0 # a number above 0
 falsify spec.yaml --claim SAFE-INV      # unknown claim about runs 'SAFE-INV'
 falsify spec.yaml --sampler nothing     # one of cma, halton, random, module:Class or file.py:Class

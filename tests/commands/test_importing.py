@@ -201,7 +201,7 @@ import barn w.world --ugv map_1:-2,3:-2,13      # ugvs.map_1: 'map_1' is not all
 import ros-map nowhere.yaml                     # nowhere.yaml cannot be read
 import ros-map some.scen                        # some.scen:
 import ros-map depot.yaml --distance-m 3        # there is room for 1, with 3.2 m around each; 3 UGVs were asked for
-import ros-map depot.yaml --ugvs 2 --ugv a:2,7:15,7 # use one of the two
+import ros-map depot.yaml --ugvs 2 --ugv a:2,7:15,7 # exclude each other
 import ros-map depot.yaml --ugv a:2,7:15,0.1    # a would end -0.2
 import mapf some.scen --agents 4                # some.scen: 3 agents with a way to go; --agents 4 needs as many
 import mapf none.scen                           # none.scen: no agent is in it; wanted: a scenario of MovingAI

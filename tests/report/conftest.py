@@ -1,4 +1,9 @@
-"""A small scenario, its traces and their figures."""
+"""A small scenario, its traces and their figures; a real browser."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from report.cases import make_scenario, make_traces
@@ -22,3 +27,19 @@ def traces(scenario: Scenario) -> dict[str, Trace]:
 @pytest.fixture(scope="session")
 def drawn(scenario: Scenario, traces: dict[str, Trace]) -> list[Figure]:
     return draw.draw(scenario, traces)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        pytest.skip("no Chromium on the path: apt-get install chromium")
+    sandbox = [] if os.getuid() else ["--no-sandbox"]
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(
+            executable_path=chromium, args=[*sandbox, "--use-gl=angle", "--use-angle=swiftshader"]
+        )
+        yield started
+        started.close()

@@ -1,16 +1,13 @@
 """The page in a real browser: no violation that axe-core finds, folds that links open, a filter, no script needed."""
 
 import json
-import os
-import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 from report.cases import FINE, built, verdict
 
 from airground_drake.commands import index
@@ -20,13 +17,9 @@ from airground_drake.report.model import of
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 NARROW, WIDE, WAIT_MS = 390, 1280, 120_000
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the path: apt-get install chromium"),
-]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -50,15 +43,6 @@ def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: py
     path = tmp_path_factory.mktemp("page") / "report.html"
     path.write_text(html.render(of(report), figures), "utf-8")
     return path
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        sandbox = [] if os.getuid() else ["--no-sandbox"]
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=sandbox)
-        yield started
-        started.close()
 
 
 def opened(browser: Browser, file: Path, anchor: str = "", width: int = WIDE, **options: Any) -> Page:

@@ -47,7 +47,7 @@ def test_every_verdict_has_a_place_in_the_order() -> None:
 
 WORSE: dict[str, Callable[[Json], object]] = {
     "refuted": lambda found: claim(found, "a").update(status="refuted", as_expected=False),
-    "nothing to check": lambda found: claim(found, "").update(exercised=0),
+    "not tested": lambda found: claim(found, "").update(exercised=0),
     "an error": lambda found: claim(found, "a").update(status="error", as_expected=False),
     "as bad, and expected no longer": lambda found: claim(found, "a_printed").update(as_expected=False),
     "better, and not expected": lambda found: claim(found, "a_printed").update(status="holds", as_expected=False),

@@ -53,7 +53,7 @@ def test_new_empty_and_own_folders_are_taken(holds: dict[str, str], tmp_path: Pa
 )
 def test_a_folder_that_holds_something_else_is_left_alone(holds: dict[str, str], why: str, tmp_path: Path) -> None:
     fill(tmp_path, holds)
-    with pytest.raises(FolderError, match=f"{why}; allowed: a folder that is new or empty") as refused:
+    with pytest.raises(FolderError, match=f"{why}; it must be new, empty") as refused:
         folder.prepare(tmp_path)
     assert str(refused.value).isprintable()
     assert content(tmp_path) == holds

@@ -204,7 +204,7 @@ def test_safe(edits: list[Edit], mark: str, lines: list[str]) -> None:
         ([away(stands=True)], "partly", ["1 of 2 (as declared)", "r1 stopped"]),
         ([away(stands=True), HELD], "partly", ["1 of 2 (as declared)", "r1 stopped, held by rock and crate"]),
         ([away(stands=True, kept_away={"by": "man"}), HELD], "partly",
-         ["1 of 2 (as declared)", "r1 stopped, man is at its target"]),
+         ["1 of 2 (as declared)", "r1 stopped, man occupies its target"]),
         ([away(stands=True), metric("lost_at_the_end", ["r1"]), HELD, judged("LIVE-GOAL", as_expected=False)], "partly",
          ["1 of 2", "r1 stopped, no way found"]),
         ([away(creeps=True), fault, judged("LIVE-GOAL", as_expected=None)], "partly",
@@ -236,7 +236,7 @@ def test_arrived(edits: list[Edit], mark: str, lines: list[str]) -> None:
           "why refused: waiting looked cheaper"]),
         ("b", [sent((1.0, "released"), (None, "withdrawn first"))], ["2 sent: 1 not begun, 1 obeyed"]),
         ("d", [metric("messages", {"proposals": 1, "withdrawals": 1, "answers": 3, "always_on": {"proposals": 40}})],
-         ["never called", "5 messages (always-on 40)"]),
+         ["never called", "5 messages (40 if always on)"]),
         ("d", [lost(2.0)], ["never called", "fly was lost at 2 s"]),
         ("d", [lost(999.0)], ["never called"]),
     ],
@@ -328,14 +328,14 @@ def test_threshold() -> None:
 def test_seeds_and_paper() -> None:
     rows = [SEED | {"kept": seed < 7, "seed": seed, "min_distance_m": 0.9 - 0.1 * seed} for seed in (1, 2, 7)]
     assert checks("Other seeds?", lambda found: found["seeds"].extend(rows)) == [
-        ("no", "d: distances kept in 2 of 3, all home in 3"),
+        ("no", "d: distances kept in 2 of 3, all arrive in 3"),
         ("", "the worst: r1\N{EN DASH}rock 0.200 < 0.3 m at 4.00 s, run d, seed 7"),
     ]
     statuses = ("reproduced", "calibrated", "calibrated", "not_reproduced")
     (told,) = checks(
         "Paper reproduced?", lambda found: found["reproduction"].extend({"id": "", "status": s} for s in statuses)
     )
-    assert told == ("partly", "3 of 4 numbers match: 1 without tuning, 2 after calibration, 1 not")
+    assert told == ("partly", "3 of 4 numbers match (1 without tuning, 2 after calibration), 1 not")
 
 
 def test_what_is_not_as_declared_and_what_not_to_conclude() -> None:

@@ -121,6 +121,6 @@ def test_what_is_wrong_with_a_run_does_not_pass(change: Callable[[Log], Log], lo
 
 def test_robots_that_are_left_to_the_judge_of_traces() -> None:
     turns, appears = load("case_a_unicycle"), load("case_a", [*SHORT, "obstacles.obstacle_1.appears_s=2.0"])
-    for scenario, what in (turns, "does not move as it is told"), (appears, "an obstacle that appears"):
+    for scenario, what in (turns, "does not follow its commands exactly"), (appears, "an obstacle that appears"):
         with pytest.raises(NoScreenError, match=what):
             ArrayJudges(Batch(scenario, "a"))

@@ -1,4 +1,4 @@
-"""First order: it moves as it is told."""
+"""First order: it follows commands exactly."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Literal
@@ -8,7 +8,7 @@ from airground_drake.model.plants.plant import Keys, Plant
 
 @dataclass(slots=True, kw_only=True)
 class FirstOrderKeys(Keys):
-    """It moves as it is told."""
+    """It follows commands exactly."""
 
     kind: Literal["first_order"] = "first_order"
     """The default."""
@@ -19,6 +19,6 @@ class FirstOrderKeys(Keys):
 
 @dataclass(frozen=True)
 class FirstOrder(Plant):
-    """p_dot = v: it moves as it is told."""
+    """p_dot = v: it follows commands exactly."""
 
     unproved: ClassVar[str] = ""

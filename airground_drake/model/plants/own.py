@@ -17,7 +17,7 @@ class OwnKeys(Keys):
     kind: Annotated[Words, ValueRule(str, lambda: {"anyOf": [{"enum": PLANTS.others}, {"pattern": PLUGIN_PATTERN}]})]
     """Its class: `module:Class` or `file.py:Class`."""
     drift_m_s: NotNegative = 0.0
-    """How far its steered point misses a command in a period at most, divided by the period."""
+    """Largest distance by which its steered point misses a command in a period, divided by the period."""
     cover_m: NotNegative = 0.0
     """How far the body is at most from the steered point's straight line in a control period."""
     parameters: dict[Name, Real] = field(default_factory=dict)

@@ -13,6 +13,7 @@ from airground_drake.report.metrics import closest_obstacle
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.scenario.schema import Preset, Reproduction, Scenario
 from airground_drake.sim.trace import Trace
+from airground_drake.verify.engines.geometry import travelled
 
 PRINTED_SPEED_M_S = 1.0  # reference speed of Table 1, [3.3, 1t, 0]
 REFERENCE_POINTS = 121  # points of the reference's way that a finding keeps for its figure
@@ -85,23 +86,23 @@ def _timing(scenario: Scenario, traces: Mapping[str, Trace]) -> Item | None:
             continue
         preset, zeta = scenario.ugvs[robot].preset, float(traces[name].meta["zeta_m"])
         stall = MEASURES["stall_position"](traces[name], robot)
-        travelled = leaves_ball(preset, stall, zeta) if stall else None
-        if travelled is None:
+        length = leaves_ball(preset, stall, zeta) if stall else None
+        if length is None:
             continue
-        reach = np.linspace(0.0, 1.2 * travelled, REFERENCE_POINTS)
+        reach = np.linspace(0.0, 1.2 * length, REFERENCE_POINTS)
         measured = MEASURES["trigger_time"](traces[row.run], robot) if row.run in traces else []
-        due_s, ours_s = travelled / PRINTED_SPEED_M_S, travelled / preset.speed_m_s
+        due_s, ours_s = length / PRINTED_SPEED_M_S, length / preset.speed_m_s
         return item(
             6, "Table 1",
-            f"Without noise the reference is zeta away from the stalled {robot} after {travelled:.3f} m: at "
+            f"Without noise the reference is zeta away from the stalled {robot} after {length:.3f} m: at "
             f"{due_s:.2f} s with the printed {PRINTED_SPEED_M_S:g} m/s, at {ours_s:.2f} s with this scenario's "
             f"{preset.speed_m_s:g} m/s.",
             printed_s, ours_s, not math.isclose(due_s, printed_s, abs_tol=0.05),
             {
                 "run": name, "robot": robot, "stall_position_m": stall, "zeta_m": zeta,
-                "reference_travelled_m": travelled, "trigger_at_printed_speed_s": due_s,
+                "reference_travelled_m": length, "trigger_at_printed_speed_s": due_s,
                 "trigger_at_scenario_speed_s": ours_s, "scenario_speed_m_s": preset.speed_m_s,
-                "speed_that_gives_the_paper_s_time_m_s": travelled / printed_s,
+                "speed_that_gives_the_paper_s_time_m_s": length / printed_s,
                 "reference": {"travelled_m": reach.tolist(), "distance_m": _distances(preset, reach, stall)},
                 "measured_trigger": {"run": row.run, "t_s": measured[0]} if measured else None,
             },
@@ -128,11 +129,9 @@ def leaves_ball(preset: Preset, centre: list[float], radius: float) -> float | N
     return left
 
 
-def _distances(preset: Preset, travelled: Array, centre: list[float]) -> list[float]:
+def _distances(preset: Preset, lengths: Array, centre: list[float]) -> list[float]:
     """Distances (T,), m, of a point from a preset trajectory after the travelled lengths (T,), m."""
-    points = np.array(preset.waypoints_m)[:, :2]
-    ends = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    at = np.stack([np.interp(travelled, ends, points[:, axis]) for axis in (0, 1)], axis=1)
+    at = travelled(np.array(preset.waypoints_m)[:, :2], 1.0, lengths)
     return [float(d) for d in np.linalg.norm(at - np.array(centre[:2]), axis=1)]
 
 

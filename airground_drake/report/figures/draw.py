@@ -212,9 +212,11 @@ def _distances(chosen: _Selection) -> Figure | None:
     least = "Too close" if at.is_short else "Closest"
     least += f": {ugv} is {at} from {at.whom} at {at.t_s:.2f} s"
     least += f", {at.safe_distance_m:g} m required"
+    hidden = len(chosen.first.ugvs) - len(chosen.ugvs)
+    left_out = f" {hidden} more UGVs are not drawn; their data are in the trace." if hidden else ""
     caption = (
         f"{least} ({_runs(heading).lower()}). No line may enter the hatched band. "
-        f"Circle: the smallest distance, exact; red: too small.{_left_out(chosen, chosen.ugvs)}"
+        f"Circle: the smallest distance, exact; red: too small.{left_out}"
     )
     return Figure("distances", "Distances to the nearest obstacles and robot", caption, tuple(panels))
 
@@ -282,8 +284,3 @@ def _team(chosen: _Selection) -> Figure:
         called = sum(bool(events_of(chosen.runs[name], ugv, "trigger")) for ugv in ugvs)
         there.append(f"Run {name}: {len(of)} of {len(ugvs)} UGVs arrive, {called} triggered.")
     return Figure("team", "The whole team", f"{' '.join(there)} Each bar counts UGVs.", tuple(panels))
-
-
-def _left_out(chosen: _Selection, drawn: list[str]) -> str:
-    hidden = len(chosen.first.ugvs) - len(drawn)
-    return f" {hidden} more UGVs are not drawn; their data are in the trace." if hidden else ""

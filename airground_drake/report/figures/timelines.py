@@ -89,7 +89,6 @@ TOGETHER_S = 0.2  # events that follow each other within this time share a label
 # Margins beside axes, heights of a row and of a line of text above it, width of a character, inches.
 _LEFT_IN, _RIGHT_IN, _ROW_IN, _LINE_IN, _CHAR_IN = 0.55, 1.05, 0.75, 0.15, 0.066
 _COLORS = {"accept": canvas.GOOD, "refuse": canvas.ALARM, "release": canvas.MUTED, "over": canvas.MUTED}
-# Look of the band below the safe distance.
 
 
 def distances(

@@ -23,7 +23,7 @@ def drawn(rows: pd.DataFrame, key: str) -> str:
             costs.plot(values[key], values[f"{kind} promised_m"], color=look.color, linestyle=(0, (2, 2)))
             if (old := f"{kind} old_positions_m") in values:
                 may_part = values[law] + values[old].fillna(0.0)
-                costs.plot(values[key], may_part, color=look.color, linestyle=":", label="may only part within")
+                costs.plot(values[key], may_part, color=look.color, linestyle=":", label="may only separate within")
         for position, (run, of_run) in enumerate(rows.groupby("run")):
             look, times = canvas.look(position), all_there[of_run.index]
             arrivals.plot(of_run[key], times, color=look.color, marker=look.marker, label=f"run {run}")

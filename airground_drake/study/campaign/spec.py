@@ -34,8 +34,8 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.study.campaign.course import REPLACES, Course
 from airground_drake.study.campaign.distributions import GRID, HALTON, KINDS, Key, combinations, made, stream, values_of
 from airground_drake.study.campaign.rows import TIMES
-from airground_drake.verify.finding import PLAIN_NAME
 
+PLAIN_NAME = "^[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}$"  # a file name that stays in its folder, on any system
 COURSE = "course"  # name of the random numbers that maps and teams are drawn from
 # Keys about the paper's numbers, which say nothing about a drawn scenario.
 NOT_JUDGED: dict[str, Any] = {"reproduction": [], "choices": []}
@@ -76,9 +76,7 @@ class File:
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
-    name: Annotated[
-        str, wanted("a name of at most 100 letters, digits, _, . and -", pattern=f"^{PLAIN_NAME.pattern}$", strict=True)
-    ]
+    name: Annotated[str, wanted("a name of at most 100 letters, digits, _, . and -", pattern=PLAIN_NAME, strict=True)]
     title: Words = ""
     scenario: Annotated[Words, wanted("a shipped scenario, or the path of a YAML file", min_length=1)]
     runs: _Names = ()

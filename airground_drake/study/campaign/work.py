@@ -197,17 +197,17 @@ def died(index: int) -> list[Row]:
 
 
 def _of_claim(verdict: Verdict) -> Row:
-    finding, against = verdict, verdict.counterexample or {}
+    against = verdict.counterexample or {}
     who = " and ".join(str(against[key]) for key in ("robot", "first", "second", "other") if key in against)
     broken = f"{against['hypothesis']}, {who or 'all'} at {against['t_s']:.2f} s" if "hypothesis" in against else ""
     return {
         "claim": verdict.claim.id,
         "what": broken,
-        "status": finding.status,
+        "status": verdict.status,
         "as_expected": verdict.as_expected is not False,
-        "margin": float("nan") if finding.margin is None else float(finding.margin),
-        "unit": finding.unit,
-        "exercised": float("nan") if finding.exercised is None else float(finding.exercised),
+        "margin": float("nan") if verdict.margin is None else float(verdict.margin),
+        "unit": verdict.unit,
+        "exercised": float("nan") if verdict.exercised is None else float(verdict.exercised),
     }
 
 

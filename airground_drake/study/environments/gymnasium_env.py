@@ -36,15 +36,7 @@ class InterventionEnv(Episodes, gymnasium.Env[Numbers, Numbers]):
 
     metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium has it
 
-    def __init__(
-        self,
-        given: Scenario | Spec | None = None,
-        run: str | None = None,
-        numbers: Sequence[int] | None = None,
-        encoding: Encoding | None = None,
-    ) -> None:
-        """Arguments as of `Episodes`."""
-        super().__init__(given, run, numbers, encoding)
+    def _prepare(self) -> None:
         self.observation_space = gymnasium.spaces.Box(self.encoding.low, self.encoding.high, dtype=np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.encoding.actions,), np.float32)
         self._seen: Observation | None = None

@@ -12,9 +12,7 @@ with needed():
     from gymnasium.utils import seeding
     from pettingzoo import ParallelEnv
 
-from airground_drake.scenario.schema import Scenario
-from airground_drake.study.campaign.spec import Spec
-from airground_drake.study.environments.encoding import Encoding, Numbers
+from airground_drake.study.environments.encoding import Numbers
 from airground_drake.study.environments.sources import Episodes, Rewards
 from airground_drake.uav.policy import Observation
 
@@ -31,15 +29,7 @@ class TeamEnv(Episodes, ParallelEnv[str, Numbers, Numbers]):
     _ignored = ("options",)  # which PettingZoo's own API test gives
     metadata = {"name": "airground_drake_team_v0", "render_modes": []}  # noqa: RUF012 - as PettingZoo has it
 
-    def __init__(
-        self,
-        given: Scenario | Spec | None = None,
-        run: str | None = None,
-        numbers: Sequence[int] | None = None,
-        encoding: Encoding | None = None,
-    ) -> None:
-        """Arguments as of `Episodes`."""
-        super().__init__(given, run, numbers, encoding)
+    def _prepare(self) -> None:
         self.possible_agents = list(self._source.ugvs)
         self.agents: list[str] = []
         self.render_mode = None

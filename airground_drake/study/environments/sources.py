@@ -126,6 +126,10 @@ class Episodes:
         self._source = Source(load(DEFAULT) if given is None else given, run, numbers)
         self._episode: Episode | None = None
         self._over = False
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Define the spaces of observations and actions."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Share the source and copy the rest, including the present episode; TypeError if Drake makes it."""

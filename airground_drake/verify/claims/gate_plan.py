@@ -55,11 +55,11 @@ class GatePlan(GateClaim):
     subject = "plans of the gatekeeper"
     summary = "Every decision is based on a feasible plan whose cost was recorded correctly."
     statement = (
-        "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, no step of it is "
-        "faster than the UGV may be, and relaxed plans were rounded by sum-up rounding, with an integrated error of at"
-        " most half a stage. Under method (d) no decision chose to stop short of the goal if the other choice would "
-        "have reached it, or stopped nearer to it. The margin is informative only: it is the largest known gap between"
-        " the cost of a plan and the optimum of the half-plane problem."
+        "Under method (c) the plan of every decision satisfies (26b)-(26e) at its recorded cost, and no step of it is "
+        "faster than the UGV may be. Relaxed plans were rounded by sum-up rounding, with an integrated error of at "
+        "most half a stage. Under method (d) no decision chose to stop short of the goal if the other choice would "
+        "have reached it, or stopped nearer to it. The margin is informative only: it is the largest known gap between "
+        "the cost of a plan and the optimum of the half-plane problem."
     )
     latex = (
         r"\rho_k = \rho_{k-1} + \Delta t (\omega_k a_k + (1 - \omega_k) b_k), \quad \rho_0 = p(t), \quad "

@@ -21,7 +21,7 @@ class LiveGate(LiveWait):
         r"h \text{ the period of the gatekeeper}",
     )
     method = (
-        "Theorems in Coq about the transitions of a commitment. Tests compare the transitions of the running "
+        "Theorems in Coq about the transitions of an acceptance. Tests compare the transitions of the running "
         "`Patience` with the theorem's, and disturb the running gatekeeper and control law. LIVE-HYP checks the "
         "hypotheses on every run under (d). The report counts the acceptances without a new obstacle, and without an "
         "obstacle in range that may move."

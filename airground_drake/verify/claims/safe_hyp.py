@@ -25,11 +25,12 @@ from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
 from airground_drake.verify.engines.shortfalls import POINT, SCREEN_M, rounded_up, shortage, shortfalls
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.runs.control_law import inequalities_of
+from airground_drake.verify.runs.control_law import BINDING_M_S, inequalities_of
 from airground_drake.verify.runs.demands import differences
 from airground_drake.verify.runs.old_positions import heard_at, missed_m, unsure_m
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
+    MOST_LISTED,
     Pair,
     apart_of,
     bounds_of,
@@ -47,8 +48,6 @@ from airground_drake.verify.runs.passive import beside, beside_moving, last_peri
 # A speed may be above its limit by this much, m/s: a command that is shortened to its limit errs by 1e-15 m/s, and in
 # one period of 25 ms this moves a robot by 2.5e-11 m.
 VELOCITY_TOLERANCE_M_S = 1e-9
-BINDING_M_S = 1e-9  # an avoidance inequality binds where a command has no more than this to spare, m/s
-MOST_LISTED = 300  # pairs that the evidence lists at most: those with the least guarantee
 AVOIDANCE = "avoidance"  # the hypothesis that the steps met the inequalities
 PASSIVE = "avoidance beside an obstacle that may move"  # the hypothesis that the steps met the passive law
 DECLARED = "declared speed"  # the hypothesis that an obstacle moved no faster than it was expected to
@@ -112,12 +111,12 @@ class SafeHyp(TraceClaim):
         "for A if one of two robots may have to stand. Beside an obstacle that may move, the passive law held and the "
         "obstacle was no faster than declared, so d was kept in every period that began at d + V h or more. The "
         "controllers had the scenario's parameters; a controller of the user's own is judged by its steps alone. If "
-        "robots act on measured positions, the inequalities are about measured positions (beside an obstacle that may "
-        "move, about true or measured ones; of two robots that measure each other, about those of one of them), the "
-        "errors were within their bound, and d is about true bodies. If messages between UGVs may be lost, a UGV "
-        "stood unless it knew that the senders of missing messages were far. If UGVs act on old positions "
-        "(`control.law: asynchronous`), each step avoided all points that the other could reach before it decided "
-        "again, up to e, and the two kept d minus the sum of all e."
+        "robots act on measured positions, the inequalities are about these, the errors were within their bound, and d "
+        "is about true bodies. Beside an obstacle that may move, true or measured positions must meet the law; of two "
+        "robots that measure each other, the view of one suffices. If messages between UGVs may be lost, a UGV stood "
+        "unless it knew that the senders of missing messages were far. If UGVs act on old positions (`control.law: "
+        "asynchronous`), each step avoided all points that the other could reach before it decided again, up to e, and "
+        "the two kept d minus the sum of all e."
     )
     latex = (
         r"n^\top (p_i^{k+1} - p_i^k) \ge q\, b - e_i, \quad b = \begin{cases} A h (d - D) & D \le d \\ d - D & D > d "
@@ -151,10 +150,10 @@ class SafeHyp(TraceClaim):
         "The command of a row is the velocity applied since the row before (the trace's convention).",
         "The points that the law steers move straight from row to row. For robots that turn, lag or receive commands "
         "late, D and d are about these points: d is d_law of SAFE-BUDGET.",
-        "Beside an obstacle with `appears_s` the hypotheses are those from the first control sample at or after that "
-        "time on, and the safe start is that D >= d at that sample. At that sample, the bodies of robots that lag, "
-        "receive commands late or never drive backwards must also be clear, and so must their paths during the delay "
-        "under commands already given. Otherwise nothing is promised for the pair.",
+        "Beside an obstacle with `appears_s` the hypotheses are judged from that time on, rounded up to a control "
+        "sample; the safe start is that D >= d at that sample. At that sample, the bodies of robots that lag, receive "
+        "commands late or never drive backwards must also be clear, and so must their paths during the delay under "
+        "commands already given. Otherwise nothing is promised for the pair.",
         "Robots act on the measured positions that are recorded.",
         "With `control.law: asynchronous` UGVs are discs that follow commands exactly, and the positions that they "
         "receive were exact when sent.",

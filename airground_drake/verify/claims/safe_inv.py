@@ -49,9 +49,9 @@ class SafeInv(TheoremClaim):
         "Positions are integrals of the commands, which are held between samples; all robots are sampled at the same "
         "instants.",
         "Obstacles are static: pairs with an obstacle that may move are not covered (see SAFE-OWN), and neither are "
-        "two UGVs that act on old positions of each other (see SAFE-BUDGET). Robots obey their speed limits, which "
-        "pairs out of range need. D is the distance of a robot's centre from the other's centre or, signed, from an "
-        "obstacle's convex core. All radii are part of d.",
+        "two UGVs that act on old positions of each other (see SAFE-BUDGET). Robots obey their speed limits, so that "
+        "pairs out of range stay apart for a period. D is the distance of a robot's centre from the other's centre "
+        "or, signed, from an obstacle's convex core. All radii are part of d.",
         "A UGV's velocity has no z component.",
     )
     does_not_establish = (

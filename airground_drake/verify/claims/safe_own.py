@@ -5,15 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airground_drake.base.errors import TraceError
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.encounters import own_margins, steps_of
-from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, apart_of, pairs_of, snapshot
+from airground_drake.verify.runs.pairs import DISTANCE_TOLERANCE_M, MOST_LISTED, apart_of, pairs_of, snapshot
 from airground_drake.verify.runs.passive import beside
-
-MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margin
 
 
 class SafeOwn(TraceClaim):
@@ -56,10 +53,7 @@ class SafeOwn(TraceClaim):
 
     def applies(self, trace: Trace) -> bool:
         """Only for runs with obstacles that may move; otherwise SAFE-TRACE suffices."""
-        try:
-            return any(barrier.expected_speed_m_s > 0.0 for barrier in trace.scenario.barriers.values())
-        except TraceError:
-            return True  # `judge` reports the fault
+        return any(barrier.expected_speed_m_s > 0.0 for barrier in trace.scenario.barriers.values())
 
     def check(self, trace: Trace) -> Finding:
         margins = sorted(_margins(trace), key=lambda own: own.margin_m)

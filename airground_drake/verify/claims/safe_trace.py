@@ -13,6 +13,7 @@ from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.encounters import encounters
 from airground_drake.verify.runs.pairs import (
     DISTANCE_TOLERANCE_M,
+    MOST_LISTED,
     apart_of,
     least_gap,
     least_of,
@@ -21,8 +22,6 @@ from airground_drake.verify.runs.pairs import (
     snapshot,
     steered_margin,
 )
-
-MOST_LISTED = 300  # pairs that the evidence lists at most: those of least margin
 
 
 class SafeTrace(TraceClaim):
@@ -54,9 +53,8 @@ class SafeTrace(TraceClaim):
         " up to its height. A distance is the gap between surfaces; below 0 they overlap. d_ij is the obstacle's own "
         "`distance_m`, or the safe distance of the kind of pair.",
         "For a UGV, walls are infinitely high. Obstacles are static for the whole run, as listed in the scenario, or "
-        "move without rotation as recorded in the trace, straight between two rows. An obstacle with `appears_s` is "
-        "judged from the first control sample at or after that time on, one with `disappears_s` up to the first at or "
-        "after that time, both instants included.",
+        "move without rotation as recorded in the trace, straight between two rows. An obstacle is judged from "
+        "`appears_s` to `disappears_s`, each rounded up to a control sample and included.",
     )
     does_not_establish = (
         "Safety of any other run, start or seed, or of a plant that does not follow its velocity exactly (SAFE-DIST); "

@@ -39,9 +39,9 @@ class ThrChoice(ModelClaim):
         r"\text{rule bayes: } B(\zeta) = \min_z B(z), \quad \text{otherwise } B(\zeta) - \min_z B(z) \text{ is shown}",
     )
     method = (
-        "The optimum is the root of (19) with c2/c1, enclosed by two signs in ball arithmetic (THR-ROOT, THR-OPT). The"
-        " threshold in force equals it to 1e-6 (relative), or it is declared. A declared threshold cannot be refuted, "
-        "so it counts as not exercised. For each run the report shows the drift of the task error in the last second "
+        "The optimum is the root of (19) with c2/c1, enclosed by two signs in ball arithmetic (THR-ROOT, THR-OPT). The "
+        "threshold in force equals it to 1e-6 (relative), or it is declared. A declared threshold cannot be refuted, "
+        "so it counts as not tested. For each run the report shows the drift of the task error in the last second "
         "before it first reached the threshold, the noise, the optimum for both, and the cost of the threshold in "
         "force."
     )

@@ -52,8 +52,8 @@ class ThrQuality(TraceClaim):
     subject = "timing of triggers"
     summary = "The UAV intervened when the real task error, without noise, was close to the threshold."
     statement = (
-        "The task error without noise agreed with the threshold to within the width of the hysteresis: no trigger "
-        "came at a smaller error, and while the UAV watched, no larger error went without a trigger."
+        "The task error without noise agreed with the threshold to within the width of the hysteresis: no trigger came "
+        "at a smaller error, and no larger error went without a trigger while one was allowed."
     )
     latex = (
         r"e(t) = \lVert \rho_{rd}(t) - \rho(t) \rVert, \quad w = \zeta - \zeta_{release} \quad "
@@ -63,12 +63,12 @@ class ThrQuality(TraceClaim):
     )
     method = (
         "e is rebuilt from positions and preset, exactly in continuous time. An excursion starts when e reaches zeta "
-        "while the UAV watches, and ends when e falls below the release level. A trigger in an excursion is late by "
-        "the time since its start. Outside, it is early if e >= zeta - w or if e reaches zeta before the release, and "
-        "false otherwise. An excursion without a trigger is missed if e exceeds zeta + w. If e is at least zeta when a"
-        " watch starts, as at the end of a dwell, the excursion starts then, and an immediate trigger is not late. The"
-        " shares of false and missed triggers, and decision times, are compared with (17)-(18) for the noise of the "
-        "run and its drift: the growth of e in the last second before it first reaches zeta."
+        "while a trigger is allowed, and ends when e falls below the release level. A trigger in an excursion is late "
+        "by the time since its start. Outside, it is early if e >= zeta - w or if e reaches zeta before the release, "
+        "and false otherwise. An excursion without a trigger is missed if e exceeds zeta + w. If e is at least zeta "
+        "when triggers become allowed, as at the end of a dwell, the excursion starts then, and an immediate trigger "
+        "is not late. The shares of false and missed triggers, and decision times, are compared with (17)-(18) for the "
+        "noise of the run and its drift: the growth of e in the last second before it first reaches zeta."
     )
     equations = "(15), (17)-(18), (20)"
     assumptions = (

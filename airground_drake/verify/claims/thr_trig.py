@@ -71,16 +71,16 @@ class ThrTrig(TraceClaim):
         r"\max x = \max(x(0), x(1)), \quad \min x = \min(x(0), x(1), p w + \text{const})",
     )
     method = (
-        "(15) is rebuilt from positions, noise and the scenario's preset. The recorded x, the signal that the trigger "
-        "has, is compared with it at every row: `port_against_15` in the evidence. If they agree, the rebuilt x is "
-        "used between rows, too; if not, or if another block computes x, x is taken as linear between rows. It is cut "
-        "at the preset's corners and at its turning points (closed form) into monotone pieces; crossings are then sign"
-        " changes, located by Brent's method to 1e-12 s. The automaton is run again on x, and its events and the mode "
+        "(15) is rebuilt from positions, noise and the scenario's preset. The recorded x, the input of the trigger, is "
+        "compared with it at every row: `port_against_15` in the evidence. If they agree, the rebuilt x is used "
+        "between rows, too; if not, or if another block computes x, x is taken as linear between rows. It is cut at "
+        "the preset's corners and at its turning points (closed form) into monotone pieces; crossings are then sign "
+        "changes, located by Brent's method to 1e-12 s. The automaton is run again on x, and its events and the mode "
         "column are compared one by one. All rows within one noise period must contain the same noise sample, after "
         "correction for the leak. Theorems in Coq show that the running trigger misses nothing in a step: the largest "
-        "value of x is at an end, and the least one has a closed form, with p the distance of the error's line from 0,"
-        " k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). The evidence has their hypotheses: the noise changes its rate"
-        " at control samples only. Tests compare the running trigger with dense sampling."
+        "value of x is at an end, and the least one has a closed form, with p the distance of the error's line from 0, "
+        "k = (n1 - n0)/|e1 - e0| and w = sqrt(1 - k^2). The evidence has their hypotheses: the noise changes its rate "
+        "at control samples only. Tests compare the running trigger with dense sampling."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -93,10 +93,10 @@ class ThrTrig(TraceClaim):
     )
     does_not_establish = (
         "That the threshold is a good one (THR-CHOICE); that the noise has the stated distribution (THR-DDM), or the "
-        "stated leak if no period of the noise has a row within; or anything about a Wiener path between the noise "
-        "samples. If x only touches a level to within rounding, 1e-12 m, the verdict depends on rounding. Two "
-        "crossings less than 1e-6 s apart may be treated as simultaneous. If a hypothesis fails, the theorems say "
-        "nothing about other runs of the scenario."
+        "stated leak if no row lies within a noise period; or anything about a Wiener path between the noise samples. "
+        "If x only touches a level to within rounding, 1e-12 m, the verdict depends on rounding. Two crossings less "
+        "than 1e-6 s apart may be treated as simultaneous. If a hypothesis fails, the theorems say nothing about other "
+        "runs of the scenario."
     )
 
     theorems = ("Isolation.largest_at_an_end", "Isolation.nowhere_below", "Isolation.attained")

@@ -33,8 +33,8 @@ class ZenoProof(TheoremClaim):
         "Time never runs backwards.",
         "x is any number at any time: no bound on the noise or its rate is used.",
         "Triggers are the times at which the automaton enters INTERVENING. The simulator locates crossings of x to "
-        "1e-6 s, which delays triggers. It brings no two of them closer than the dwell, because guards and "
-        "triggered_at use the time of the event itself.",
+        "1e-6 s, which delays triggers. This brings no two triggers closer than the dwell, because the automaton uses "
+        "the time of the event itself.",
     )
     does_not_establish = (
         "That triggers come at the right time (THR-TRIG), or that the bare threshold is Zeno (ZENO-REFINE measures how"

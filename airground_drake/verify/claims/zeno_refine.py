@@ -178,10 +178,10 @@ class ZenoRefine(ModelClaim):
     method = (
         f"The running `Trigger` counts triggers exactly on {PATHS} piecewise linear Wiener paths with the task error "
         f"held at the threshold, at {HALVINGS + 1} noise steps over a factor of {2**HALVINGS}. Exponents are fitted by "
-        "least squares with a term for the finite step, ln(mean) = c + p ln(dt) + b sqrt(dt), with "
-        "99 % intervals by bootstrap over the paths. Supported if the bare exponent's interval, widened by the known "
-        "bias of the fit, contains -1/2 and is below -1/4, the automaton's contains 0 and is within 1/10 of it, and no "
-        "path exceeds the bound. The bare counts must also be within 5 standard errors of their exact expectation."
+        "least squares with a term for the finite step, ln(mean) = c + p ln(dt) + b sqrt(dt), with 99 % intervals by "
+        "bootstrap over the paths. Supported if the bare exponent's interval, widened by the known bias of the fit, "
+        "contains -1/2 and is below -1/4; the automaton's contains 0 and is within 1/10 of it; and no path exceeds the "
+        "bound. The bare counts must also be within 5 standard errors of their exact expectation."
     )
     equations = "(15), (20)"
     assumptions = (
@@ -190,9 +190,8 @@ class ZenoRefine(ModelClaim):
         "hysteresis within a dwell, a larger noise is used that does; the bare count is the same at any intensity.",
     )
     does_not_establish = (
-        "A proof of divergence or of the limit (ZENO-PROOF proves the bound for the automaton), or the number of "
-        "events in a run of the scenario, where the task error passes the threshold and does not stay there "
-        "(ZENO-TRACE counts them)."
+        "A proof of divergence or of the limit; ZENO-PROOF proves the bound for the automaton. The number of events in "
+        "a run, where the task error does not stay at the threshold; ZENO-TRACE counts them."
     )
 
     kept = True

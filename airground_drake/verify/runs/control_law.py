@@ -15,6 +15,7 @@ from airground_drake.verify.runs.old_positions import heard_places, unsure_m
 from airground_drake.verify.runs.pairs import contacts, is_planar, pairs_beside, parts_of
 
 PLANE = np.array([1.0, 1.0, 0.0])  # directions in which a UGV can move
+BINDING_M_S = 1e-9  # an avoidance inequality binds where a command has no more than this to spare, m/s
 ON_TOP = ("b", "c")  # methods with accepted interventions above the avoidance inequalities, as in (20)
 
 

@@ -461,3 +461,4 @@ FEW_PARTS = 50  # parts into which it is divided first
 # A distance may be this much below the safe one, m: the controller steers *onto* the safe distance, and sums of some
 # thousand rounded steps err by 1e-12 m. The reported margin does not contain it.
 DISTANCE_TOLERANCE_M = 1e-9
+MOST_LISTED = 300  # pairs that the evidence of a claim lists at most: those of least margin

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
+from report.cases import GOING_ROUND, SUCCESS, make_trace
 
 from airground_drake.report.replay import scene as scenes
 from airground_drake.report.replay.scene import Scene, Sent, Span
@@ -16,11 +16,6 @@ PROPOSALS = (
     Sent("ugv1", "p", PATH, (Span(12.0, 12.1, "asked"), Span(12.1, 13.1, "refused"))),
     Sent("ugv1", "p", PATH, (Span(14.5, 14.6, "asked"), Span(14.6, 16.9, "accepted"))),
 )
-
-
-@pytest.fixture(scope="session")
-def scenario() -> Scenario:
-    return make_scenario()
 
 
 @pytest.fixture(scope="session")

@@ -1,36 +1,19 @@
 """The replay in a real browser: any name is shown, and the page's policy admits its own scripts and no other."""
 
-import os
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from airground_drake.report.replay import page as pages
 from airground_drake.report.replay.scene import Scene
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 WAIT_MS = 120_000
 NAMES, OBSTACLES = ("__proto__", "constructor", "uav"), ("toString", "valueOf", "rock")
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the path: apt-get install chromium"),
-]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        sandbox = [] if os.getuid() else ["--no-sandbox"]
-        started = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=[*sandbox, "--use-gl=angle", "--use-angle=swiftshader"]
-        )
-        yield started
-        started.close()
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture

@@ -14,14 +14,7 @@ from airground_drake.commands.campaign import _code, _summary
 from airground_drake.study.campaign.conduct import Stopping
 from airground_drake.study.campaign.evidence import evidence
 from airground_drake.study.campaign.page import lines_of, page
-from airground_drake.study.campaign.rows import (
-    COLUMNS,
-    INVALID,
-    JUDGED,
-    STOPPED,
-    Row,
-    blank,
-)  # fmt: skip
+from airground_drake.study.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.study.campaign.statistics import clopper_pearson, confidence_sequence
 from airground_drake.study.campaign.work import died
 

@@ -181,22 +181,15 @@ def two_line_ends(folder: Path) -> Path:
     return folder / "log.csv"
 
 
-def parquet_of_frames(folder: Path) -> Path:
-    """With the times as an index, and the bodies as categories."""
+def parquet(folder: Path, change: Callable[[pd.DataFrame], pd.DataFrame] = pd.DataFrame.copy) -> Path:
     head, *lines = logs.long(FULL)
     frame = pd.DataFrame(lines, columns=head).astype({name: float for name in head if name != "body"})
-    frame.astype({"body": "category"}).set_index("t_s").to_parquet(folder / "log.parquet")
+    change(frame).to_parquet(folder / "log.parquet")
     return folder / "log.parquet"
 
 
-def parquet(folder: Path, dates: bool = False) -> Path:
-    head, *lines = logs.long(FULL)
-    frame = pd.DataFrame(lines, columns=head)
-    frame[head[:1] + head[2:]] = frame[head[:1] + head[2:]].astype(float)
-    if dates:
-        frame[head[0]] = pd.Timestamp("2026-05-04T10:00:00Z") + pd.to_timedelta(frame[head[0]], unit="s")
-    frame.to_parquet(folder / "log.parquet")
-    return folder / "log.parquet"
+def dated(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame.assign(t_s=pd.Timestamp("2026-05-04T10:00:00Z") + pd.to_timedelta(frame["t_s"], unit="s"))
 
 
 def two_files(folder: Path) -> list[Path]:
@@ -404,8 +397,10 @@ FORMS = {
     "no uav": Form(table("log.csv", lambda: logs.long(logs.motion(("tb_0", "tb_1")))), logs.motion(("tb_0", "tb_1")),
                    ("uav is not in the log",)),
     "parquet": Form(parquet, FULL),
-    "parquet with dates": Form(partial(parquet, dates=True), FULL),
-    "parquet of a frame": Form(parquet_of_frames, FULL),
+    "parquet with dates": Form(partial(parquet, change=dated), FULL),
+    "parquet of a frame with an index and categories": Form(
+        partial(parquet, change=lambda frame: frame.astype({"body": "category"}).set_index("t_s")), FULL
+    ),
     "times of each body": Form(table("log.csv", own_clocks), JITTER),
     "velocities beside positions": Form(table("log.csv", velocities), FULL),
     "a folder per robot": Form(by_folder, FULL),

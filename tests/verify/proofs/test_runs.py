@@ -317,7 +317,7 @@ def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(
         ([str(tmp_path)], "wanted: the folder of a report"),
         ([str(made), "--run", "e"], "unknown run of .* 'e'; allowed: d"),
         (["--run", "d"], "--run needs DIR"),
-        ([str(made), "--record"], "--record goes without DIR"),
+        ([str(made), "--record"], "--record and DIR exclude"),
     ):
         assert main(["prove", *arguments]) == 2
         said = capsys.readouterr().err
