@@ -81,9 +81,10 @@ def checked(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = 
             warnings.simplefilter("ignore")  # extreme numbers are refused by the rules, without warnings of numpy
             return check_report(folder, limit_s, told)
     except Disagreement as broken:
-        raise UsageError(f"{folder} is not a report: {broken.rule}: {broken.about} is {broken.recorded}") from None
+        fault, wanted = f"{broken.about} is {broken.recorded}", broken.rule
     except NotEstablished as error:
-        raise UsageError(f"{folder} is not a report: {error.rule}: {error.about}: {error.why}") from None
+        fault, wanted = f"{error.about}: {error.why}", error.rule
+    raise UsageError(f"{folder} is not a report: {fault}; wanted: {wanted}")
 
 
 def verdict(lines: Sequence[CheckLine]) -> int:

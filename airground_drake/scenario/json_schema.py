@@ -149,7 +149,8 @@ def wanted_at(whole: Schema, *at: str) -> str:
         least, most = says.get(f"min{size}"), says.get(f"max{size}")
         if least == most == 3:
             return f"3 numbers{unit}: [x, y, z]"
-        many = f" of {least} {f'to {most}' if most else 'or more'} entries" if least or most else ""
+        span = least if least == most else f"{least} to {most}" if most else f"{least} or more"
+        many = f" of {span} entries" if least or most else ""
         return f"a {what}{many}{unit}"
     return {
         "number": "a number{unit} from {minimum:g} to {maximum:g}",

@@ -163,8 +163,12 @@ def _checked(document: Document) -> Scenario:
     try:
         validate.check(scenario, document.source)
     except ScenarioError as error:
-        place = document.where(*error.key.split("."), key=True)
-        raise ScenarioError(place, error.key, error.value, error.allowed) from None
+        section, *key = at = error.key.split(".")
+        is_default = (
+            len(key) == 1 and key[0] not in (document.data.get(section) or ()) and not isinstance(error.value, Fault)
+        )
+        allowed = f"{error.allowed}; {error.value!r} is the default" if is_default else error.allowed
+        raise ScenarioError(document.where(*at, key=True), error.key, error.value, allowed) from None
     return scenario
 
 

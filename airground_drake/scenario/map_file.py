@@ -1,5 +1,6 @@
 """Maps in the files of ROS's `map_server`: a YAML file and the image that it names."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,6 +82,9 @@ def read(path: Path, where: str = "", *, copied: bool = False) -> MapFile:
         fault = Fault(f"{about.image} is {error}")
         raise ScenarioError(document.where("image"), "image", fault, "wanted: the image of a map") from None
     x, y, heading = about.origin
+    if abs(heading) > math.tau:
+        allowed = f"from -{math.tau:.6g} to {math.tau:.6g} rad"
+        raise ScenarioError(document.where("origin", "2"), "origin.2", heading, allowed)
     return MapFile(cells, Frame(about.resolution, (x, y, heading)), {path: data, image: content})
 
 

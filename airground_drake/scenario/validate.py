@@ -235,7 +235,8 @@ def _corners(key: str, corners: Sequence[Vector], least: int, *, closed: bool) -
     edges = [(k - 1, k) for k in range(0 if closed else 1, len(corners))]
     for i, j in edges:
         if math.dist(corners[i], corners[j]) <= TOLERANCE:
-            yield f"{key}.{j}", corners[j], "a corner other than the one before it"
+            last, other = (j, "the one before it") if j else (len(corners) - 1, "the first: the outline ends there")
+            yield f"{key}.{last}", corners[last], f"a corner other than {other}"
     if closed and corners and (met := crossing([(x, y) for x, y in corners])):
         first, second = (list(corners[k]) for k in met)
         yield key, corners, f"edges that do not meet: those that end at {first} and at {second} do"

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from airground_drake.base.errors import AirgroundError, UnknownNameError
+from airground_drake.base.errors import AirgroundError, FolderError, UnknownNameError
 from airground_drake.base.progress import Progress, progress_bar
 from airground_drake.base.statuses import NOT_EXERCISED, outcome
 from airground_drake.base.usage import refuse
@@ -72,13 +72,15 @@ def _line(verdict: Verdict) -> str:
 
 def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plugins: bool) -> list[Verdict]:
     # Third-party claims that a saved run names are imported only if they are wanted, and only if that is allowed.
-    from airground_drake.scenario.load import from_data, load
+    from airground_drake.scenario.load import from_data, load, shipped
     from airground_drake.sim import trace
     from airground_drake.verify import judge, judge_model
     from airground_drake.verify.registry import model_claims, run_claims
 
     folder = Path(target)
     run = trace.load(folder) if os.path.lexists(folder / "meta.json") else None
+    if run is None and folder.is_dir() and target not in shipped():
+        raise FolderError(f"{target} is not a saved run: it has no meta.json; wanted: DIR/trace/RUN, or a scenario")
     scenario = load(target) if run is None else from_data(run.meta["scenario"], target)
     added = {name: place for name, place in scenario.claims.items() if not wanted or name in wanted}
     imported = None if run is None else [f"claims.{name}" for name in added]

@@ -184,12 +184,12 @@ run minimal d -o spec.yaml/below        # cannot be written: Not a directory; wa
 run minimal z                           # unknown run 'z'; allowed: a, d
 run minimal d --speed 2                 # --speed needs --meshcat
 check                                   # the following arguments are required: DIR
-check .                                 #
+check .                                 # report.json: No such file or directory; wanted: the file can be read
 check --limit-s 0 report                # a number above 0
-check spec.yaml                         #
+check spec.yaml                         # report.json: Not a directory; wanted: the file can be read
 list nothing                            # invalid choice: 'nothing'
 verify                                  # the following arguments are required: target
-verify . SAFE-TRACE                     #
+verify . SAFE-TRACE                     # . is not a saved run: it has no meta.json; wanted: DIR/trace/RUN
 compare one                             # the following arguments are required: AFTER
 compare . .                             # is not a report
 index .                                 # there are no reports

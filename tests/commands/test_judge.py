@@ -83,7 +83,9 @@ def test_what_the_package_exports_is_judged_like_the_run(
     if trace is None:
         given = logs.scenario()
         given["safe_distance"]["ugv_m"] = 0.1
-        given["ugvs"]["tb_0"]["plant"] = {"kind": "unicycle", "hand_point_m": 0.1}
+        # Names of robots that occur in names of columns: x.y_m, x.body_x_m.
+        given["ugvs"] = {"x": given["ugvs"]["tb_0"], "body": given["ugvs"]["tb_1"]}
+        given["ugvs"]["x"]["plant"], given["uav"]["name"] = {"kind": "unicycle", "hand_point_m": 0.1}, "y"
         judged_by = (tmp_path / "lab.yaml").as_posix()
         (tmp_path / "lab.yaml").write_text(yaml.safe_dump(given))
         trace = simulate(load(judged_by), "a")

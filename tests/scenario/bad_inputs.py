@@ -56,6 +56,8 @@ EDITS: list[tuple[str, object]] = [
     # shapes
     ("obstacles.rock", {"polygon_m": [[4, 0], [5, 0], [6, 0], [5.5, 1]], "distance_m": 0.05}),
     ("obstacles.rock", {"polygon_m": [[4, 0], [6, 0], [4, 1], [6, 1]]}),
+    ("obstacles.rock", {"polygon_m": [[4, 0], [6, 0], [6, 1], [4, 0]]}),
+    ("obstacles.rock", {"polygon_m": [[4, 0, 0], [6, 0, 0], [6, 1, 0]]}),
     ("obstacles.rock", {"polygon_m": [[4, 0], [6, 0], [5, 1e-10]]}),
     ("obstacles.rock", {"polygon_m": [[4, 0], [5, 0], [6, 1e-12], [5.5, 2e-12]]}),
     ("arena_m", [[-1e7, -30], [1e7, 30]]),

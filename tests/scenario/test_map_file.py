@@ -168,6 +168,7 @@ MISTAKES: list[tuple[Callable[[Path], object], str]] = [
     (changing(resolution=math.nan), "resolution: nan is not allowed"),
     (changing(resolution="5 cm"), "resolution: '5 cm' is not allowed"),
     (changing(origin=[0.0, 0.0]), "origin: [0.0, 0.0] is not allowed; wanted: 3 numbers: [x, y, yaw], m and rad"),
+    (changing(origin=[0.0, 0.0, 90]), "room.yaml:8: origin.2: 90.0 is not allowed; from -6.28319 to 6.28319 rad"),
     (changing(origin=[0.0, 0.0, math.inf]), "origin.2: inf is not allowed"),
     (changing(occupied_thresh=65), "occupied_thresh: 65.0 is not allowed; wanted: a number from 0 to 1"),
     (changing(free_thresh=0.7), "free_thresh: 0.7 is not allowed; at most occupied_thresh = 0.65"),

@@ -137,12 +137,10 @@ def clock_of(place: Place, times: Sequence[Time], labels: Sequence[str]) -> Time
 
 def _axis(base: str, bodies: Collection[str]) -> tuple[str, str]:
     """Name and axis of a column without its unit: `tb1.x`, `tb1_pos_x`, also `x_tb1` of a body; else ''."""
-    if (match := _AXIS_FIRST.fullmatch(base)) and match[2] in bodies:
-        return match[2], match[1].lower()
-    if match and match[2].lower() in _POSITIONS:
-        return match[2], match[1].lower()
-    match = _AXIS.fullmatch(base)
-    return ((match[1] or "").strip(), match[2].lower()) if match else ("", "")
+    last, first = _AXIS.fullmatch(base), _AXIS_FIRST.fullmatch(base)
+    if first and not (last and last[1] in bodies) and (first[2] in bodies or first[2].lower() in _POSITIONS):
+        return first[2], first[1].lower()
+    return ((last[1] or "").strip(), last[2].lower()) if last else ("", "")
 
 
 def split_unit(label: str) -> tuple[str, str]:

@@ -157,7 +157,7 @@ class Gathered:
                 rows = [row for row in rows if row[1] is not None]
             times = [stamp if stamped and stamp is not None else received for received, stamp, _ in rows]
             xyz = np.array([place for _, _, place in rows], dtype=np.float64).reshape(-1, 3)
-            whole = np.array(times, dtype=np.int64)
+            whole, received = np.array(times, dtype=np.int64), np.array([row[0] for row in rows], dtype=np.int64)
             stream = Stream(
                 source=self.source,
                 name=body or topic,
@@ -168,6 +168,7 @@ class Gathered:
                 frame=frame,
                 child=child,
                 clock=HEADERS if stamped else RECEIPT,
+                late_s=float(np.median(received / 1e9 - whole / 1e9)),
             )
             if stamped and without:
                 stream.skipped["no stamp"] = without

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import LogError, one_line
+from airground_drake.report.sentences import some
 from airground_drake.study.logs import bags, tables
 from airground_drake.study.logs.stream import Log
 from airground_drake.study.logs.tables import Wanted
@@ -29,7 +30,7 @@ def opened(paths: Sequence[Path], wanted: Wanted) -> Log:
                     raise LogError(message) from None
                 log.unusable.append(message)
     if log.unusable and not log.streams:
-        raise LogError(log.unusable[0])
+        raise LogError(f"no file of the folder is a log: {some(log.unusable, most=3)}")
     log.ignored += log.unusable
     return log
 

@@ -21,6 +21,8 @@ YEAR_2000_S, YEAR_2100_S = 946_684_800, 4_102_444_800  # stamps between these ar
 PER_M = {"m": 1.0, "cm": 100.0, "mm": 1000.0}  # units of length, and how many of each are a metre
 OF_MESSAGES = HEADERS, RECEIPT = "header stamps", "times of receipt"  # clocks of messages
 LAST = np.iinfo(np.int64).max
+# Suffix of a robot's name in this package's tables for its body, if the law steers another point.
+OF_BODY = ".body"
 # Suffixes that loggers append to a body's name.
 AFTER = re.compile(r"_(?:pos|position|pose|odom|odometry|translation|p)$", re.IGNORECASE)
 # Words in a name that exclude a body's position.
@@ -54,6 +56,7 @@ class Stream:
     child: str = ""  # frame that the body carries; '' if the source does not say
     clock: str = ""  # what the stamps are: "header stamps", "times of receipt", or the name of a column
     is_file: bool = False  # whether `name` is the stem of a file
+    late_s: float = 0.0  # median of time of receipt less header stamp; 0 if stamps are not those of headers
     counts_frames: bool = False  # whether stamps are numbers of frames, by the name of their column
     skipped: Counter[str] = field(default_factory=Counter)  # rows without a position or a stamp, by the reason
     # Where the first of them is, by the reason: "line 12"; '' if the source has no lines.
@@ -117,6 +120,8 @@ def body_of(name: str, bodies: Collection[str], *, is_file: bool = False) -> str
     """The one body that a name names, or ''."""
     # It is a part of the path: `/tb3_0/odom`, `tb3_0_pose`. The stem of a file may contain it between other words:
     # `run2_tb3_0-odom`. Capitals count only if two bodies differ by them.
+    if (robot := name.removesuffix(OF_BODY)) in bodies:
+        return robot
     parts = {part for segment in segments(name) for part in (segment, AFTER.sub("", segment))}
     named = {body for body in bodies if body in parts}
     if not named:

@@ -6,6 +6,7 @@ Detection from the first lines would fail with headers of several lines, or with
 import csv
 import io
 import re
+import warnings
 from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -66,11 +67,12 @@ def read(content: bytes) -> Table:
     good = [k for k in data if _count(lines[k], delimiter) == count]
     chosen = set(good)
     try:
-        cells = pd.read_csv(
-            io.StringIO("\n".join(lines[k] for k in good)), sep=delimiter if delimiter != " " else r"\s+", header=None,
-            names=list(range(count)), index_col=False, dtype=str, keep_default_na=False, na_filter=False,
-            skip_blank_lines=False,
-        )  # fmt: skip
+        with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):  # quotes joined lines
+            cells = pd.read_csv(
+                io.StringIO("\n".join(lines[k] for k in good)), sep=delimiter if delimiter != " " else r"\s+",
+                header=None, names=list(range(count)), index_col=False, dtype=str, keep_default_na=False,
+                na_filter=False, skip_blank_lines=False,
+            )  # fmt: skip
     except pd.errors.ParserError as error:
         raise LogError(f"it is not a table: {error}") from None
     if len(cells) != len(good):

@@ -15,6 +15,8 @@ from airground_drake.check.scenario import expected_m_s, robots_of, uavs_of
 from airground_drake.report.sentences import counted
 from airground_drake.study.logs import axes, units
 from airground_drake.study.logs.stream import (
+    HEADERS,
+    OF_BODY,
     OF_MESSAGES,
     PER_M,
     RECEIPT,
@@ -30,8 +32,6 @@ from airground_drake.study.logs.stream import (
 # A body was not recorded where two of its samples are farther apart than this multiple of the usual time between.
 GAP = 2.5
 SINCE_1970_NS = 10**17  # from here on, stamps are since 1970; times are then from the first sample
-# Suffix of a robot's name in this package's tables for its body, if the law steers another point.
-OF_BODY = ".body"
 SAME_M = 1e-9  # positions of one body at one time that differ by less are one
 # Share of a body's rows that may contradict others: with more, stamps are too coarse, or recordings are mixed.
 CONTRADICTORY = 0.1
@@ -40,6 +40,7 @@ CONTRADICTORY = 0.1
 LOST_M, LOST = 0.05, 5.0
 MOST_LEAPS = 0.5  # share of a body's steps that may be leaps
 ORIGIN_M = 1e-3  # robots that start so close to (0, 0) start there
+CLOCKS_S = 0.5  # header stamps that differ by more than messages may take indicate different clocks
 MOST_PASSES = 100  # of a search for rows that are lost
 # Stretches in the order of time that are compared with each other, and rows of one at least.
 MOST_RECORDINGS, FEW = 20, 5
@@ -146,6 +147,16 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
     if len(clocks := {stream.clock for stream in streams.values() if stream.clock in OF_MESSAGES}) > 1:
         late = ", ".join(name for name, stream in streams.items() if stream.clock == RECEIPT)
         remarks.append(f"clocks differ: {late} by {RECEIPT}, others by {(clocks - {RECEIPT}).pop()}")
+    late_s = {
+        name: stream.late_s for name, stream in streams.items()
+        if stream.clock == HEADERS and stream.whole.min() >= SINCE_1970_NS  # a simulator has one clock
+    }  # fmt: skip
+    if late_s and (apart_s := max(late_s.values()) - min(late_s.values())) > CLOCKS_S:
+        slow, fast = max(late_s, key=late_s.__getitem__), min(late_s, key=late_s.__getitem__)
+        remarks.append(
+            f"clocks may differ: among messages received together, {HEADERS} of {fast} are {apart_s:.3g} s later than "
+            f"those of {slow}"
+        )
     stamps = {name: stream.ns(stream.time_unit) for name, stream in streams.items()}
     first = min(int(ns.min()) for ns in stamps.values())
     zero = first if first >= SINCE_1970_NS else 0

@@ -125,10 +125,10 @@ def test_nothing_to_judge_is_no_verdict(tmp_path: Path) -> None:
         judge(found, alone)
 
 
-@pytest.mark.parametrize("form", ["float", "date", "one zero"])
+@pytest.mark.parametrize("form", ["float", "date", "one zero", "other clock"])
 def test_stamps_of_headers_count_in_every_form(form: str, tmp_path: Path, document: dict[str, Any]) -> None:
-    """Messages come 0.3 s late; a message without a stamp is left out."""
-    said = []
+    """Messages come 0.3 s late; a message without a stamp is left out; another clock is named."""
+    said, late_s = [], 2.0 if form == "other clock" else 0.3
     for k, t in enumerate(FULL["uav"][0]):
         ns = logs.EPOCH_NS + round(t * 1e9)
         whole, rest = divmod(ns, 10**9)
@@ -141,12 +141,14 @@ def test_stamps_of_headers_count_in_every_form(form: str, tmp_path: Path, docume
                 stamp = f"{pd.Timestamp(ns, tz='UTC').isoformat()}"
             position = dict(zip("xyz", places[k].tolist(), strict=True))
             message = {"header": {"stamp": stamp, "frame_id": "map"}, "pose": {"position": position}}
-            said.append((ns + 300_000_000 * (name == "tb_0"), f"/{name}/pose", "PoseStamped", message))
+            said.append((ns + round(1e9 * late_s) * (name == "tb_0"), f"/{name}/pose", "PoseStamped", message))
     logs.mcap_json(tmp_path / "run.mcap", said)
     found = logs.read(tmp_path / "run.mcap", document)
     least_m, _ = logs.least_gaps(FULL)[BROKEN]
     assert pair_of(judge(found, document).pairs, *BROKEN).least_m == pytest.approx(least_m, abs=1e-6)
     assert {each.origin["clock"] for each in found.bodies.values()} == {"header stamps"}
+    of_clocks = ["header stamps of tb_1 are 2 s later than those of tb_0" in remark for remark in found.remarks]
+    assert sum(of_clocks) == (form == "other clock"), found.remarks
 
 
 def test_odometry_of_one_robot_beside_positions_without_a_frame_is_refused(
@@ -200,6 +202,9 @@ def test_a_folder_may_have_other_files_and_a_log_that_cannot_be_read_is_told(
         logs.read(tmp_path, document)
     with pytest.raises(LogError, match=r"README\.md: "):
         logs.read(tmp_path / "README.md", document)
+    (tmp_path / "tb_0.csv").write_bytes(b"")
+    with pytest.raises(LogError, match=r"no file of the folder is a log: .*README\.md: .*tb_0\.csv: .* and 1 more$"):
+        logs.read(tmp_path, document)
 
 
 def test_a_log_of_one_instant_is_refused(tmp_path: Path, document: dict[str, Any]) -> None:

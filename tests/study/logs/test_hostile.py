@@ -118,6 +118,7 @@ TABLES = st.lists(st.lists(CELLS, max_size=6).map(";".join), max_size=9).map("\n
 
 @example(b'0;;"')
 @example(b'0;1;"a\n0;1;b"\n0;1;2')
+@pytest.mark.filterwarnings("error")
 @given(st.binary(max_size=400) | st.text(max_size=400).map(str.encode) | TABLES.map(str.encode))
 def test_noise_is_refused(content: bytes) -> None:
     try:
