@@ -185,7 +185,7 @@ class RunFacts:
             return f"collided with {next(body for body in bodies if body != robot)}"
         way = self.way(robot)
         state = "stopped" if way.stands else "hardly moving" if way.creeps else "still driving"
-        known = {"by": way.kept_away and way.kept_away["by"], "left_s": way.left_s,
+        known = {"by": way.kept_away and way.kept_away["by"], "left_s": way.left_s and float(f"{way.left_s:.2g}"),
                  "held_by": " and ".join(self.holders(robot)[:2])}  # fmt: skip
         causes = (words.format(**known) for applies, words in rules.CAUSES if applies(self, robot))
         return ", ".join([state, *list(causes)[:1]])

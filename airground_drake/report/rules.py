@@ -62,7 +62,7 @@ CAUSES: tuple[tuple[Callable[[RunFacts, str], object], str], ...] = (
     (lambda run, robot: run.way(robot).kept_away, "{by} occupies its target"),
     (lambda run, robot: robot in [fault["robot"] for fault in run.run.faults], "the policy failed"),
     (lambda run, robot: robot in run.run.no_way, "no way found"),
-    (lambda run, robot: run.way(robot).left_s is not None, "{left_s:.2g} s to go"),
+    (lambda run, robot: run.way(robot).left_s is not None, "{left_s:g} s to go"),
     (lambda run, robot: run.holders(robot), "held by {held_by}"),
     (lambda run, robot: run.refused_all(robot), "refused all proposals"),
 )

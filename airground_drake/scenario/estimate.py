@@ -80,7 +80,7 @@ class Estimate(NamedTuple):
         if seconds < LONG_S:
             return ""
         return (
-            f"method (c) searches for a plan at up to {self.decisions:.2g} decisions: about {seconds:.2g} s if the UAV "
+            f"method (c) searches for a plan at up to {self.decisions:.0f} decisions: about {seconds:.0f} s if the UAV "
             f"proposes all the time, more if searches are hard; each ends after {Budget().search_s:g} s"
         )
 

@@ -10,6 +10,7 @@ Robots of several sizes share the nodes. The regions are drawn for each size, wi
 
 from collections.abc import Sequence
 from heapq import heappop, heappush
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -61,7 +62,7 @@ class _Edge(NamedTuple):
     tail: int
     head: int
     size: int
-    line: Array
+    nodes: list[int]  # of the roadmap, in the order in which they are passed
 
 
 def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
@@ -84,9 +85,9 @@ def coarsened(movers: Sequence[Mover], width: float) -> Coarse:
         _add_borders(edges, ways, space, places, seeds, size)
         own = np.flatnonzero(sizes == size)
         leaving += _from_starts(ways, space, places, seeds, own, starts, size, width)
-    every = [*edges.values(), *(_Edge(edge.head, edge.tail, edge.size, edge.line[::-1]) for edge in edges.values())]
-    every += [edge._replace(tail=len(seeds) + edge.tail) for edge in leaving]
-    graph, largest = _graph(np.concatenate([places[seeds], places[starts]]), every, len(spaces))
+    every = [*edges.values(), *(_Edge(edge.head, edge.tail, edge.size, edge.nodes[::-1]) for edge in edges.values())]
+    every += [_Edge(len(seeds) + edge.tail, edge.head, edge.size, edge.nodes) for edge in leaving]
+    graph, largest = _graph(places, np.concatenate([seeds, starts]), every)
     usable = largest[None, :] <= sizes[:, None]
     return Coarse(graph, len(seeds) + np.arange(len(movers)), number[targets], usable, sizes)
 
@@ -176,17 +177,16 @@ def _add_borders(
     for a, b, u, v, is_free in zip(
         low[new].tolist(), high[new].tolist(), tails[new].tolist(), heads[new].tolist(), straight.tolist(), strict=True
     ):
-        if is_free:
-            line = places[[a, b]]
-        else:
+        nodes = [a, b]
+        if not is_free:
             u, v = (u, v) if nearest[u] == a else (v, u)
-            line = places[[*_back(before, u)[::-1], *_back(before, v)]]
+            nodes = [*_back(before, u)[::-1], *_back(before, v)]
         pair = (int(number[a]), int(number[b]))
         before_it = edges.get(pair)
         if before_it is None:
-            edges[pair] = _Edge(*pair, size, line)
-        elif NO_LONGER * _length(line) < _length(before_it.line):
-            edges[*pair, size] = _Edge(*pair, size, line)
+            edges[pair] = _Edge(*pair, size, nodes)
+        elif NO_LONGER * _length(places[nodes]) < _length(places[before_it.nodes]):
+            edges[*pair, size] = _Edge(*pair, size, nodes)
 
 
 def _from_starts(
@@ -200,8 +200,7 @@ def _from_starts(
         straight = space.segments_are_free(np.repeat(places[starts[i]][None], len(near), axis=0), places[seeds[near]])
         for s, is_free in zip(near.tolist(), straight.tolist(), strict=True):
             seed = int(seeds[s])
-            line = places[[starts[i], seed]] if is_free else places[_back(before[k], seed)[::-1]]
-            edges.append(_Edge(i, s, size, line))
+            edges.append(_Edge(i, s, size, [int(starts[i]), seed] if is_free else _back(before[k], seed)[::-1]))
     return edges
 
 
@@ -217,30 +216,40 @@ def _length(line: Array) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
-def _graph(places: Array, edges: Sequence[_Edge], sizes: int) -> tuple[CoarseGraph, Indices]:
-    """The graph with these nodes and edges, and the largest size that can use each edge, (E,)."""
-    stays = [_Edge(k, k, 0, place[None]) for k, place in enumerate(places)]
-    every = sorted([*stays, *edges], key=lambda edge: (edge.tail, len(edge.line) > 1, edge.head, edge.size))
-    first = np.searchsorted([edge.tail for edge in every], np.arange(len(places) + 1)).astype(np.int64)
-    heads = np.array([edge.head for edge in every], dtype=np.int64)
-    lines = [_as_motion(edge.line) for edge in every]
-    begins = np.append(0, np.cumsum([len(line) for line in lines])).astype(np.int64)
-    rows = np.concatenate(lines)
+def _graph(places: Array, nodes: Indices, edges: Sequence[_Edge]) -> tuple[CoarseGraph, Indices]:
+    """The graph with these nodes of the roadmap and these edges, and the largest size that can use each edge, (E,)."""
+    # places: of all nodes of the roadmap, m
+    stays = [_Edge(k, k, 0, [node]) for k, node in enumerate(nodes.tolist())]
+    *ends, lines = zip(*stays, *edges, strict=True)
+    tails, heads, sizes = np.array(ends, dtype=np.int64)
+    counts = np.array([len(line) for line in lines])
+    order = np.lexsort((sizes, heads, counts > 1, tails))
+    first = np.searchsorted(tails[order], np.arange(len(nodes) + 1)).astype(np.int64)
+    passed = places[list(chain.from_iterable(lines[k] for k in order.tolist()))]
+    begins, rows = _motions(passed, np.append(0, np.cumsum(counts[order])).astype(np.int64))
     lows, highs = (extreme.reduceat(rows[:, 1:], begins[:-1]) for extreme in (np.minimum, np.maximum))
     circles = np.column_stack([0.5 * (lows + highs), 0.5 * np.hypot(*(highs - lows).T)])
     legs = np.append(0.0, np.cumsum(np.hypot(*np.diff(rows[:, 1:], axis=0).T)))
     lengths = legs[begins[1:] - 1] - legs[begins[:-1]]
-    graph = CoarseGraph(places, first, heads, lengths, begins, rows, circles)
-    return graph, np.array([edge.size for edge in every], dtype=np.int64)
+    return CoarseGraph(places[nodes], first, heads[order], lengths, begins, rows, circles), sizes[order]
 
 
-def _as_motion(line: Array) -> Array:
-    """A polyline (K, 2), m, as a motion from 0 to 1 at constant speed; one row for a single place."""
-    if len(line) == 2 and (line[0] != line[1]).any():
-        motion = np.empty((2, 3))
-        motion[:, 0], motion[:, 1:] = (0.0, 1.0), line
-        return motion
-    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
-    if along[-1] == 0.0:
-        return np.append(0.0, line[-1])[None]
-    return without_repeats(np.column_stack([along / along[-1], line]))
+@njit(cache=True)
+def _motions(lines: Array, ends: Indices) -> tuple[Indices, Array]:
+    """Polylines, stacked (K, 2), m, each as a motion from 0 to 1 at constant speed; one row for a single place."""
+    # ends: first row of each line, and the end of the last one. Returns the same of the motions, and their rows.
+    begins, rows = np.zeros_like(ends), np.empty((len(lines), 3))
+    for e in range(len(ends) - 1):
+        line = lines[ends[e] : ends[e + 1]]
+        motion = np.zeros((len(line), 3))
+        motion[:, 1:] = line
+        for k in range(1, len(line)):
+            motion[k, 0] = motion[k - 1, 0] + np.hypot(line[k, 0] - line[k - 1, 0], line[k, 1] - line[k - 1, 1])
+        if motion[-1, 0] == 0.0:
+            motion = motion[-1:]
+        elif len(motion) > 1:
+            motion[:, 0] /= motion[-1, 0]
+            motion = without_repeats(motion)
+        begins[e + 1] = begins[e] + len(motion)
+        rows[begins[e] : begins[e + 1]] = motion
+    return begins, rows[: begins[-1]]

@@ -123,6 +123,7 @@ class _Search:
 
     def __init__(self, movers: list[Mover], fixed: tuple[OtherRobot, ...], follow: float, effort: Effort) -> None:
         self._movers, self._fixed, self._follow, self._effort = movers, fixed, follow, effort
+        self._resting = [_resting(mover.task) for mover in movers]  # made once: movers store what a motion blocks
         self.spent, self._searches, self.candidates = 0, 0, 0
         self.outcome: Outcome = "effort spent"
         self._most = effort.expansions * max(20, len(movers)) // 20
@@ -184,7 +185,7 @@ class _Search:
 
     def _taken(self) -> list[OtherRobot]:
         """The fixed motions: of other robots, and of robots without a path."""
-        return [*self._fixed, *(_resting(self._movers[i].task) for i in self._without_way)]
+        return [*self._fixed, *(self._resting[i] for i in self._without_way)]
 
     def _in_either_way(self, order: Sequence[int]) -> tuple[list[Way | None], int | None]:
         """Plan in one order, first ignoring and then considering later robots; also the first robot without a path."""
@@ -220,7 +221,7 @@ class _Search:
     ) -> tuple[list[Way | None], int | None]:
         """Paths of the robots in this order, and the first robot without one, or None."""
         ways: list[Way | None] = [None] * len(self._movers)
-        taken = [*self._fixed, *(_resting(self._movers[i].task) for i in staying)]
+        taken = [*self._fixed, *(self._resting[i] for i in staying)]
         for k, i in enumerate(order):
             brief = [self._leaving(j) for j in order[k + 1 :]] if considerate else []
             way, spent = find(self._movers[i], taken, self._follow, self._left(), brief)
@@ -236,7 +237,7 @@ class _Search:
         """A robot at its start, until it can have left."""
         mover = self._movers[robot]
         until = LEAVING * (mover.space.apart + mover.space.spacing) / mover.speed
-        return _resting(mover.task)._replace(until=until)
+        return self._resting[robot]._replace(until=until)
 
     def _joint_steps(self, able: Sequence[int], candidates: int) -> list[Way | None] | None:
         movers = [self._movers[i] for i in able]

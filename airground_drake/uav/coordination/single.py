@@ -14,7 +14,9 @@ from airground_drake.uav.coordination.roadmap import Roadmap, RobotNodes, RobotT
 from airground_drake.uav.coordination.timed import distance, free_pieces, timed, without_repeats
 
 ROUNDING_M = 1e-9  # distances between robots may fall short by this, m
-MOST_KNOWN = 16  # number of motions for which a mover stores what they block, to limit memory
+# A mover stores what so many motions block, to limit memory; more if there are more other robots, since every search
+# goes through the motions of all of them.
+MOST_KNOWN = 16
 
 
 class OtherRobot(NamedTuple):
@@ -80,6 +82,8 @@ def find(
     # Returns the way, or None if no way is found within the budget; and the number of expanded intervals.
     own, roadmap = mover.own, mover.roadmap
     blocked = [_blocked_times(mover, other) for other in [*fixed, *brief]]
+    while len(mover.blocked) > max(MOST_KNOWN, len(blocked)):
+        del mover.blocked[next(iter(mover.blocked))]  # the one not used for longest
     nodes = np.concatenate([np.zeros(0, np.int64), *(nodes for nodes, _ in blocked)])
     times = np.concatenate([np.zeros((0, 2)), *(times for _, times in blocked)])
     free = intervals.safe_intervals(len(roadmap.nodes), nodes, times)
@@ -90,9 +94,13 @@ def find(
 
 def _blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
     """Nodes (B,) that another robot blocks, and when, (B, 2), s. Start and target have smaller radii, see `find`."""
-    known = mover.blocked.get((id(other.motion), other.radius))
-    if known is not None:
-        return known[0], np.minimum(known[1], other.until)
+    key = id(other.motion), other.radius
+    known = mover.blocked.pop(key, None) or (*_all_blocked_times(mover, other), other.motion)
+    mover.blocked[key] = known
+    return known[0], np.minimum(known[1], other.until)
+
+
+def _all_blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
     roadmap, space = mover.roadmap, mover.space
     start, target = roadmap.nodes[mover.own.start], roadmap.nodes[mover.own.target]
     at_first = float(np.hypot(*(start - other.motion[0, 1:])))
@@ -100,11 +108,7 @@ def _blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
     near = np.minimum([at_first, at_last], space.apart + other.radius) - ROUNDING_M
     radii = np.full(len(roadmap.nodes), space.wide(roadmap.longest, other.radius))
     np.minimum.at(radii, [mover.own.start, mover.own.target], near)
-    nodes, times = intervals.blocked_times(other.motion, roadmap.grid, radii)
-    if len(mover.blocked) == MOST_KNOWN:
-        mover.blocked.clear()
-    mover.blocked[id(other.motion), other.radius] = nodes, times, other.motion
-    return nodes, np.minimum(times, other.until)
+    return intervals.blocked_times(other.motion, roadmap.grid, radii)
 
 
 def _joins(mover: Mover, fixed: Sequence[OtherRobot], follow: float) -> Array:

@@ -33,16 +33,20 @@ def speed(motion: Array) -> float:
     return float((np.hypot(legs[:, 1], legs[:, 2]) / legs[:, 0]).max(initial=0.0))
 
 
+@njit(cache=True)
 def without_repeats(motion: Array) -> Array:
     """The timed motion without rows that repeat the time before, or lie on the line between their neighbours."""
-    motion = motion[np.append(True, np.diff(motion[:, 0]) > 1e-9)]
-    if len(motion) < 3:
-        return motion
-    before, here, after = motion[:-2], motion[1:-1], motion[2:]
-    share = ((here[:, 0] - before[:, 0]) / (after[:, 0] - before[:, 0]))[:, None]
-    off = np.abs(here[:, 1:] - before[:, 1:] - share * (after[:, 1:] - before[:, 1:])).max(axis=1)
-    needed = np.concatenate([[True], off > 1e-12, [True]])
-    return motion[needed]
+    rows, many = motion.copy(), 1
+    for k in range(1, len(motion)):
+        if motion[k, 0] - motion[k - 1, 0] > 1e-9:
+            rows[many] = motion[k]
+            many += 1
+    needed = np.full(many, True)
+    for k in range(1, many - 1):
+        before, here, after = rows[k - 1], rows[k], rows[k + 1]
+        off = here - before - (here[0] - before[0]) / (after[0] - before[0]) * (after - before)
+        needed[k] = max(abs(off[1]), abs(off[2])) > 1e-12
+    return rows[:many][needed]
 
 
 @njit(cache=True)

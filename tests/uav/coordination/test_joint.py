@@ -1,6 +1,7 @@
 """Joint plans keep every distance exactly, at all times, and are found where there is one."""
 
 import math
+from collections import Counter
 from dataclasses import replace
 from itertools import combinations
 
@@ -14,6 +15,7 @@ from planner import alcove
 from properties import examples
 
 from airground_drake.model.geometry import outline
+from airground_drake.uav.coordination import intervals
 from airground_drake.uav.coordination.joint import Effort, Plan, plan
 from airground_drake.uav.coordination.roadmap import RobotTask, Space, build_roadmap
 from airground_drake.uav.coordination.single import OtherRobot, _wished, sum_of_times
@@ -153,6 +155,23 @@ def test_who_finds_no_way_stays_and_is_gone_round() -> None:
     assert found.ways[0] is None
     assert found.ways[1] is not None
     assert_keeps_distances(room, tasks, found, 1.0, [])
+
+
+def test_what_a_robot_that_stands_blocks_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    computed: Counter[tuple[bytes, bytes]] = Counter()
+
+    def counted(motion: Array, grid: intervals.Grid, radii: Array) -> tuple[intervals.Indices, Array]:
+        computed[motion.tobytes(), radii.tobytes()] += len(motion) == 1
+        return blocked_times(motion, grid, radii)
+
+    blocked_times = intervals.blocked_times
+    monkeypatch.setattr(intervals, "blocked_times", counted)
+    cage = [(-4.0 + 2.5 * math.cos(a), 2.5 * math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 9)[:-1]]
+    tasks = [task((-4.0, 0.0), (4.0, 0.0)), task((4.0, 0.0), (2.0, 0.0)), task((2.0, 2.2), (4.0, 2.2))]
+    parked = [OtherRobot(np.array([[0.0, 0.4 * k, 5.0]])) for k in range(20)]
+    found = plan(space(cage), tasks, [1.0] * 3, parked)
+    assert [way is None for way in found.ways] == [True, False, False]
+    assert max(computed.values()) == 1
 
 
 def test_the_preset_is_joined_where_it_is_free_again() -> None:
