@@ -97,6 +97,17 @@ def test_of_what_is_as_near_but_for_rounding_the_first_counts() -> None:
     assert errors.published(0.0, places)[0, 1] > 2.3 + 0.9 * ERROR_M  # away from the rock, not from its nearer twin
 
 
+def test_an_adversary_changes_its_mind_at_the_sample_whatever_its_rounding() -> None:
+    scenario = crossing(errors="adversarial")
+    errors, places = (
+        errors_of(scenario, make_world(scenario)),
+        np.array([[-5.0, 0.0, 0.0], [0.0, -5.0, 0.0], [9.0] * 3]),
+    )
+    assert errors is not None
+    for turn in 0.5 * np.arange(1.0, 9.0):
+        assert np.array_equal(errors.published(np.nextafter(turn, 0.0), places), errors.published(turn, places))
+
+
 def test_robots_that_measure_each_other_pay_for_different_directions(monkeypatch: pytest.MonkeyPatch) -> None:
     scenario, claims = crossing(errors="adversarial", shared=False, seed=5), ("SAFE-TRACE", "SAFE-HYP")
     trace = simulate(scenario, "a")
