@@ -352,7 +352,7 @@ def _settled(trace: Trace, scenario: Scenario) -> Wrong:
                 ours = *_by_costs(row, standing, t - since_s, rules), row["tries"], False
             else:
                 if held.executing and standing != ACCEPT:  # withdrawn, which the UGV sees at its next sample
-                    noticed = np.searchsorted(instants, before_s + gate.period_s - SAME_S)
+                    noticed = int(np.searchsorted(instants[:-1], before_s + gate.period_s - SAME_S))
                     held = patience.stop(held, float(instants[noticed]))
                 held = patience.rested(held, t)
                 over = patience.over(held, t) if standing == ACCEPT else standing == SILENT and t >= ends_s
