@@ -5,9 +5,9 @@ so no run is simulated for this.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from itertools import pairwise, permutations
+from itertools import pairwise, permutations, zip_longest
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,15 @@ from airground_drake.scenario.schema import Channel, Scenario
 from airground_drake.scenario.sensing import errors_of
 from airground_drake.scenario.world import make_world
 from airground_drake.sim.events import unheard
+from airground_drake.sim.tables import DECISION_COLUMNS
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.channel import Message, Transit, lost
+from airground_drake.uav.messages import ACCEPT, REFUSE, SILENT
+from airground_drake.ugv.answer import Rules, settle
+from airground_drake.ugv.outcome import Outcome
+from airground_drake.ugv.outcome_gatekeeper import ACCEPTING, reason_of
+from airground_drake.ugv.patience import Commitment, Patience
+from airground_drake.ugv.solution import Solution
 from airground_drake.verify.claim import TIME_TOLERANCE_S as SAME_S
 
 CORNER_S = 1e-9  # a velocity so near to a corner of its preset, s, may be that of either side
@@ -32,7 +39,10 @@ Wrong = Iterator[tuple[str, float, Any, Any]]  # what, when, s, as recorded and 
 
 def impossible(trace: Trace, scenario: Scenario) -> Iterator[Line]:
     """A line for the first thing that cannot have been so."""
-    for rule in (_referred, _proposed, _spoken, _carried, _repeated, _heard, _measured, _executed, _decided):
+    for rule in (
+        _referred, _intervened, _proposed, _spoken, _read, _carried, _repeated, _heard, _measured, _executed, _decided,
+        _settled,
+    ):  # fmt: skip
         for about, t_s, theirs, ours in rule(trace, scenario):
             yield different("trace", trace.run, f"{about} at t = {t_s:.9g} s", theirs, ours)
             return
@@ -50,13 +60,32 @@ def _referred(trace: Trace, scenario: Scenario) -> Wrong:
             yield f"velocity of the preset of {name}, m/s,", t_s[k], theirs[k].tolist(), both[0][k].tolist()
 
 
+def _intervened(trace: Trace, scenario: Scenario) -> Wrong:
+    """Some methods have no plans, no decisions, or none of a kind; no robot sees a place without measuring it."""
+    method, names = method_of(trace.meta["method"]), [*DECISION_COLUMNS]
+    outcomes, problem = names.index("refuse_outcome_m2_s"), names.index("status")
+    unused = names[outcomes:] if method.intervention_on_top else names[problem:outcomes]
+    filled = [] if method.gated else trace.decisions["t_s"].tolist()
+    filled += [cell for name in unused for cell in trace.decisions[name].tolist() if cell not in ("", -1.0)]
+    planned = (
+        [] if method.intervenes else [*trace.plans["t_s"], *trace.proposals["issued_s"], *trace.messages["sent_s"]]
+    )
+    for what, theirs in (
+        ("plans", planned),
+        ("parts of decisions", filled),
+        ("places seen", trace.seen["t_s"].tolist()),
+    ):
+        if theirs:
+            yield f"{what} under ({method.id})", 0.0, theirs[0], "none"
+
+
 def _proposed(trace: Trace, scenario: Scenario) -> Wrong:
     """A proposal is caused by an intervention on a UGV of its UAV, and all parties of a joint plan get theirs."""
-    names = "number", "robot", "sender", "issued_s", "cause", "party"
+    names = "number", "robot", "sender", "issued_s", "cause", "party", "policy"
     rows = [*zip(*(trace.proposals[name].tolist() for name in names), strict=True)]
-    got = {(t_s, tuple(party), robot) for _, robot, _, t_s, _, party in rows}
+    got = {(t_s, tuple(party), robot) for _, robot, _, t_s, _, party, _ in rows}
     charge, ugvs = {uav: {*scenario.in_charge(uav)} for uav in scenario.aerial}, dict(enumerate(trace.ugvs))
-    for number, robot, sender, t_s, cause, numbers in rows:
+    for number, robot, sender, t_s, cause, numbers, _ in rows:
         party = [ugvs.get(k, k) for k in numbers]
         about, row = f"proposal {number}", int(np.searchsorted(trace.t, t_s - SAME_S))
         if not {robot, cause, *party} <= charge.get(sender, set()):
@@ -65,6 +94,19 @@ def _proposed(trace: Trace, scenario: Scenario) -> Wrong:
             yield f"cause of {about}", t_s, cause, "a UGV that is intervened on"
         elif missing := [mate for mate in party if (t_s, tuple(numbers), mate) not in got]:
             yield f"parties of {about}", t_s, missing, "each with a part of the joint plan"
+        elif _off_s(t_s, scenario.intervention.period_s) > SAME_S:
+            yield f"time of {about}", t_s, t_s, "a sample of its UAV"
+    plans = zip(*(trace.plans[name].tolist() for name in ("sent", "uav", "t_s", "policy")), strict=True)
+    planned = {(int(number), *plan) for sent, *plan in plans for number in sent}
+    theirs = sorted((number, sender, t_s, policy) for number, _, sender, t_s, *_, policy in rows)
+    for one, due in zip_longest(theirs, sorted(planned)):
+        if one != due:
+            yield "proposal of a plan", (one or due or (0.0,) * 3)[2], one, due
+
+
+def _off_s(t_s: float, period_s: float) -> float:
+    """How far a time is from the samples of a period, s."""
+    return abs(t_s - round(t_s / period_s) * period_s)
 
 
 def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
@@ -90,11 +132,27 @@ def _spoken(trace: Trace, scenario: Scenario) -> Wrong:
     charge = {ugv: uav for uav in scenario.aerial for ugv in scenario.in_charge(uav)}
     listed = (trace.decisions[name].tolist() for name in ("answer", "robot", "t_s", "number"))
     expected |= {("answer", k): (ugv, charge.get(ugv), *rest) for k, ugv, *rest in zip(*listed, strict=True) if k >= 0}
-    answers = [key for key in first if key[0] == "answer" and scenario.channel is None]
-    for key in dict.fromkeys([*expected, *answers]):
+    spoken = [key for key in first if key[0] == "proposal" or (key[0] == "answer" and scenario.channel is None)]
+    for key in dict.fromkeys([*expected, *spoken]):
         theirs, ours = first.get(key), expected.get(key)
         if theirs != ours:
             yield f"sending of {key[0]} {key[1]}", float((theirs or ours or (0.0,) * 3)[2]), theirs, ours
+
+
+def _read(trace: Trace, scenario: Scenario) -> Wrong:
+    """Without a channel, a UGV reads a proposal when it first decides on it or executes it; a withdrawal at once."""
+    if scenario.channel is not None:
+        return
+    gated, samples = method_of(trace.meta["method"]).gated, trace.sampled("t_s").tolist()
+    latest_first = trace.decisions[["number", "t_s"]].to_numpy()[::-1].tolist() if gated else []
+    for ugv in () if gated else trace.ugvs:
+        latest_first += [*zip(trace.sampled(f"{ugv}.executing").tolist(), samples, strict=True)][::-1]
+    first_s = dict(latest_first)
+    for kind, number, sent_s, theirs in trace.messages[["kind", "number", "sent_s", "read_s"]].to_numpy():
+        ours = first_s.get(number, math.nan) if kind == "proposal" else sent_s
+        if not (kind == "answer" or abs(theirs - ours) <= SAME_S or (math.isnan(theirs) and math.isnan(ours))):
+            read_s = ["never" if math.isnan(at) else at for at in (theirs, ours)]
+            yield f"reading of {kind} {number}", sent_s, *read_s
 
 
 def _carried(trace: Trace, scenario: Scenario) -> Wrong:
@@ -221,10 +279,19 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
     if not method_of(trace.meta["method"]).gated:
         return
     period_s, ends_s = scenario.gatekeeper.period_s, float(trace.t[-1])
+    names, before = ("robot", "number", "policy", "issued_s"), dict[str, float]()
+    known = {*zip(*(trace.proposals[name].tolist() for name in names), strict=True)}
+    for t, *about in zip(*(trace.decisions[name].tolist() for name in ("t_s", *names)), strict=True):
+        if tuple(about) not in known:
+            yield f"what {about[0]} decides on", t, about, "one of its proposals"
+        if _off_s(t, period_s) > SAME_S or t <= before.get(about[0], -math.inf):
+            yield f"time of a decision of {about[0]}", t, t, "its next sample"
+        before[about[0]] = t
     decided = {*zip(trace.decisions["number"].tolist(), (trace.decisions["t_s"] / period_s).round(), strict=True)}
     runs_out_s = {number: times[-1] for number, times in trace.proposals[["number", "times_s"]].to_numpy()}
     arrived = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s")
     sent = arrived.sort_values("received_s", kind="stable")
+    due, samples = set[tuple[int, int]](), math.ceil(ends_s / period_s - SAME_S)
     for ugv in trace.ugvs:
         news_of = sent[sent["receiver"] == ugv]
         mine = [*zip(*(news_of[name].tolist() for name in ("received_s", "about", "kind")), strict=True)]
@@ -232,7 +299,72 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
             if kind == "withdrawal" or any(other >= about for _, other, _ in mine[:k]):
                 continue
             over = (t for t, other, news in mine[k + 1 :] if other > about or (other, news) == (about, "withdrawal"))
-            until_s = min(next(over, ends_s), ends_s, runs_out_s.get(about, ends_s))
-            for sample in range(int(at_s / period_s + SAME_S) + 1, math.ceil(until_s / period_s - SAME_S)):
-                if (about, sample) not in decided:
-                    yield f"decision of {ugv} on proposal {about}", sample * period_s, "nothing", "one at each sample"
+            # what the UAV sends at a sample the UGV has at the next one; what a channel delivers then perhaps at once
+            until = next(over, ends_s) / period_s
+            until = math.ceil(until - SAME_S) if scenario.channel else int(until + SAME_S) + 1
+            until = min(until, samples, math.ceil(runs_out_s.get(about, ends_s) / period_s - SAME_S) + 1)
+            due |= {(about, sample) for sample in range(int(at_s / period_s + SAME_S) + 1, until)}
+    for number, at in sorted(due - decided if scenario.channel else due ^ decided):
+        found = ("nothing", "one") if (number, at) in due else ("one", "nothing")
+        yield f"decision on proposal {number}", at * period_s, *found
+
+
+def _by_outcomes(
+    row: Mapping[Any, Any], standing: float, over: bool, exhausted: bool, favour: bool
+) -> tuple[bool, str]:
+    """Whether method (d) accepts, and why; see `ugv.outcome_gatekeeper`."""
+    if over or (standing == SILENT and exhausted):
+        return False, "over" if over else "exhausted"
+    if standing == SILENT or (standing == ACCEPT and len(row["new"])):
+        refuse, accept = (
+            Outcome(
+                np.empty((0, 3)), row[f"{choice}_stalls"] > 0.0, row[f"{choice}_left_m"], row[f"{choice}_outcome_m2_s"]
+            )
+            for choice in ("refuse", "accept")
+        )
+        reason = reason_of(refuse, accept, favour=favour)
+        return reason in ACCEPTING, reason
+    return standing == ACCEPT, "kept"
+
+
+def _by_costs(row: Mapping[Any, Any], standing: float, stood_s: float, rules: Rules) -> tuple[bool, str]:
+    """Whether method (c) accepts, and why."""
+    plan, rounded = (np.array([row[f"{name}_first_stage"] == "accept"], dtype=float) for name in ("plan", "rounded"))
+    solution = Solution(
+        row["plan_first_stage"] == "accept", row["status"], row["objective"], plan=plan,
+        rounded=rounded if row["rounded_first_stage"] else None,
+    )  # fmt: skip
+    return settle(solution, (row["accept_throughout"], row["refuse_throughout"]), standing, stood_s, rules)
+
+
+def _settled(trace: Trace, scenario: Scenario) -> Wrong:
+    """Answers and reasons of a gatekeeper follow from the outcomes, or the costs (25), that it recorded."""
+    gate, instants = scenario.gatekeeper, trace.sampled("t_s")
+    patience = Patience(gate.tries, gate.rest_s, gate.longest_s)
+    rules = Rules(gate.switching_margin, gate.min_dwell_s, gate.rule == "first_stage")
+    sent = {number: (times[-1], by) for number, times, by in trace.proposals[["number", "times_s", "cause"]].to_numpy()}
+    for ugv in trace.ugvs:
+        held, number, standing, since_s, before_s = Commitment(), -1, SILENT, 0.0, 0.0
+        for row in trace.decisions[trace.decisions["robot"] == ugv].to_dict("records"):
+            t, (ends_s, cause) = row["t_s"], sent[row["number"]]
+            standing = standing if row["number"] == number else SILENT
+            if method_of(trace.meta["method"]).intervention_on_top:
+                ours = *_by_costs(row, standing, t - since_s, rules), row["tries"], False
+            else:
+                if held.executing and standing != ACCEPT:  # withdrawn, which the UGV sees at its next sample
+                    noticed = int(np.searchsorted(instants[:-1], before_s + gate.period_s - SAME_S))
+                    held = patience.stop(held, float(instants[noticed]))
+                held = patience.rested(held, t)
+                over = patience.over(held, t) if standing == ACCEPT else standing == SILENT and t >= ends_s
+                accepts, reason = _by_outcomes(row, standing, over, patience.exhausted(held), cause != ugv)
+                if accepts and standing == SILENT:
+                    held = patience.accept(held, t, ends_s)
+                elif standing == ACCEPT and not accepts:
+                    held = patience.stop(held, t)
+                ours = accepts, reason, float(held.tries), reason not in ("kept", "over", "exhausted")
+            theirs = row["decision"] == "accept", row["reason"], row["tries"], row["refuse_outcome_m2_s"] >= 0.0
+            if theirs != ours:
+                yield f"answer of {ugv} to proposal {row['number']}", t, theirs, ours
+            answer = ACCEPT if row["decision"] == "accept" else REFUSE
+            since_s = since_s if answer == standing else t
+            number, standing, before_s = row["number"], answer, t

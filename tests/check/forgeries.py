@@ -242,7 +242,7 @@ RULES: dict[str, tuple[str, Edit]] = {
     "mode": ("mode", cells("mode", 0.0, BETWEEN + 20)),
     "noise from elsewhere": ("noise at the start", noise(1e-7, slice(None))),
     "noise within a period": ("noise of one sample", noise(1e-7, slice(BETWEEN, BETWEEN))),
-    "large sample": ("sample of the noise", noise(0.02, slice(LATE, None))),
+    "large sample": ("sample of the noise", noise(0.012, slice(LATE, None))),
     # arrivals and collisions
     "arrival left out": ("arrivals and collisions follow from positions", without_event("arrival")),
     "collision left out": ("arrivals and collisions follow from positions", without_event("collision", "b")),

@@ -9,6 +9,7 @@ import pytest
 from airground_drake.check import plants, safety
 from airground_drake.check.rules import Disagreement
 from airground_drake.check.run import Run, _moves_as_commanded
+from airground_drake.check.scenario import pairs_of
 from airground_drake.check.shapes import Part
 from airground_drake.model.plants.budget import AT_REST, law_distance
 from airground_drake.scenario.load import load, resolved, validated
@@ -140,6 +141,13 @@ def test_what_plants_take_is_the_same_in_both_programs() -> None:
                     found = plants.law_m(1.3, ours[one], beside[0], passive=passive)
                     due = law_distance(1.3, theirs[one], beside[1], gain=gain, passive=passive)
                     assert found == pytest.approx(due, abs=1e-13)
+
+
+def test_of_two_late_robots_the_bodies_must_be_clear_for_the_longer_delay() -> None:
+    data = resolved(load("case_b"))
+    for ugv, delay_s in (("ugv1", 0.1), ("ugv2", 0.2)):
+        data["ugvs"][ugv]["plant"] = [{"kind": "delay", "delay_s": delay_s}]
+    assert {pair.start_s for pair in pairs_of(data) if {pair.robot, pair.other} == {"ugv1", "ugv2"}} == {0.2}
 
 
 def test_a_way_that_turns_is_divided_along_its_arc() -> None:

@@ -5,10 +5,12 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from airground_drake.check import safety
+from airground_drake.check import events, safety
 from airground_drake.check.plants import Way
+from airground_drake.check.rules import Disagreement
 from airground_drake.check.run import Run
 from airground_drake.check.scenario import Pair
 from airground_drake.check.shapes import Shape, shape_of
@@ -163,3 +165,33 @@ def test_all_of_a_shortfall_counts(step_m: float, status: str, monkeypatch: pyte
         monkeypatch.setattr(safety, rule, lambda run: None)
     found = safety.safe_hyp(run([2.0, 2.0 - step_m]))
     assert (found.status, found.margin) == (status, -2.0 * step_m if status == "holds" else None)
+
+
+def without_message(apart_m: float, error_m: float) -> None:
+    """Two UGVs of 1 and 2 m/s that keep 1 m drive; at the second sample, one has missed the other's message."""
+    run = SimpleNamespace(
+        links={"loss": 0.5}, scenario={"control": {"period_s": 0.1}}, pairs=[Pair("a", "b", 1.0, 0.0, 3.0, 0.5)],
+        ugvs=["a", "b"], robots={"a": {"max_speed_m_s": 1.0}, "b": {"max_speed_m_s": 2.0}}, error_m=error_m,
+        sample_s=np.array([0.0, 0.1]), sampled=lambda *_: np.ones((2, 3)),
+        samples=pd.DataFrame({"a.heard_b_s": [0.0, 0.0], "b.heard_a_s": [0.0, 0.1]}),
+        seen_m=lambda robot: np.tile([apart_m if robot == "b" else 0.0, 0.0, 0.0], (2, 1)),
+    )  # fmt: skip
+    safety._without_message(cast("Any", run))
+
+
+@pytest.mark.parametrize("error_m", [0.0, 0.1])
+def test_a_ugv_may_drive_without_a_message_of_one_that_cannot_be_near(error_m: float) -> None:
+    least_m = 1.0 + 2.0 * error_m + 0.2 + 0.3  # it may have moved for a period, and both move for another
+    without_message(least_m + 1e-6, error_m)
+    with pytest.raises(Disagreement):
+        without_message(least_m - 1e-6, error_m)
+
+
+def test_a_robot_that_arrives_as_it_collides_has_not_arrived() -> None:
+    place = np.array([[9.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    spec = {"r": {"target_m": [0.0, 0.0, 0.0]}}
+    run = SimpleNamespace(
+        t_s=np.arange(3.0), position_m={"r": place}, robots=spec, scenario={"arrival_tolerance_m": 1.0}
+    )
+    for hit_s, arrivals in ((2.0, 0), (2.5, 1)):
+        assert len([*events._arrivals(cast("Any", run), [events.Event(hit_s, "r", "collision", "wall")])]) == arrivals

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from airground_drake.check.run import Run
 from airground_drake.check.scenario import Levels
-from airground_drake.check.triggers import Variable, decision_variable, thr_quality
+from airground_drake.check.triggers import Variable, automaton, decision_variable, thr_quality
 
 SPEED_M_S = 2.0
 
@@ -51,6 +51,13 @@ def test_the_least_value_of_a_segment_is_a_knot(aside_m: float, slope_m_s: float
     sampled = np.hypot(aside_m, SPEED_M_S * (t - 5.0)) + slope_m_s * t
     assert x.x_m.min() <= sampled.min() + 1e-9
     assert x.x_m.min() >= sampled.min() - 0.01 * (SPEED_M_S + abs(slope_m_s))
+
+
+def test_a_rest_ends_with_a_trigger_only_at_the_threshold() -> None:
+    for last, due in ((0.99, ["trigger", "release", ""]), (1.0, ["trigger", "release", "", "trigger"])):
+        t, x = np.array([0.0, 1.0, 2.0, 3.0, 9.0]), np.array([0.0, 1.5, 0.2, last, last])
+        steps = automaton(Variable(t, np.pad(x[:, None], ((0, 0), (3, 0))), x), Levels(1.0, 0.5, 4.0))
+        assert [step.event for step in steps] == due
 
 
 @pytest.mark.parametrize(("dwell_s", "decisions"), [(5.0, 2), (20.0, 1)])

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from scenario.cases import DELETE, SMALL_DATA, Write, edit, message
@@ -9,6 +10,7 @@ from scenario.cases import DELETE, SMALL_DATA, Write, edit, message
 from airground_drake.base.errors import ScenarioError
 from airground_drake.scenario.load import from_data, load, resolved, validated
 from airground_drake.scenario.schema import Uav
+from airground_drake.verify.claims.live_goal import Way, conditions
 
 NORTH: dict[str, Any] = {"start_m": [0, 4, 2], "ugvs": ["two"]}
 SOUTH: dict[str, Any] = {"start_m": [0, 1, 2]}
@@ -79,3 +81,14 @@ MISTAKES = [
 @pytest.mark.parametrize(("data", "says"), MISTAKES)
 def test_mistakes_are_refused_with_what_would_do(data: dict[str, Any], says: str, write: Write) -> None:
     assert says in message(write(yaml.safe_dump(data)))
+
+
+def test_where_a_stall_is_expected_each_uav_ends_over_its_own_ugvs() -> None:
+    scenario = load("two_uavs")
+    last = np.arange(3.0 * len(scenario.ugvs)).reshape(-1, 3) ** 2
+    ways = {robot: Way(np.array([0.0, 2.0]), np.zeros((2, 3))) for robot in scenario.robots}
+    found = [*conditions(scenario, {next(iter(scenario.ugvs)): [0.0] * 3}, ways, last)]
+    for name, uav in scenario.aerial.items():
+        own = [k for k, ugv in enumerate(scenario.ugvs) if ugv in scenario.in_charge(name)]
+        (over,) = (each.entry["point_m"] for each in found if each.entry["robot"] == name)
+        assert over == (last[own].mean(axis=0) + np.array([0.0, 0.0, uav.altitude_m])).tolist()

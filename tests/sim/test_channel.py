@@ -12,6 +12,7 @@ from oracles import faults_of
 from properties import examples
 from pydrake.common.value import Value
 
+from airground_drake.scenario.links import ANSWERING_S, repeats_after
 from airground_drake.scenario.load import load, resolved
 from airground_drake.scenario.schema import Channel, WayBack
 from airground_drake.sim import blocks
@@ -29,6 +30,12 @@ NOISY = Channel(0.05, 1.0, 0.3, duplicate=0.5)
 
 def over(given: Channel | None, scenario: str = "lab", run: str = "d", *more: str) -> Trace:
     return simulate(replace(load(scenario, [*more]), channel=given), run)
+
+
+def test_a_message_is_repeated_after_the_longest_way_there_and_back() -> None:
+    for jitter_s, back_s in ((0.1, 0.4), (0.4, 0.1)):
+        given = Channel(0.2, jitter_s, up=WayBack(delay_s=0.3, jitter_s=back_s))
+        assert repeats_after(replace(load("minimal"), channel=given)) == pytest.approx(0.2 + 0.3 + 0.4 + ANSWERING_S)
 
 
 @pytest.mark.parametrize(("scenario", "name", "more"), [

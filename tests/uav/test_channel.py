@@ -50,6 +50,9 @@ def test_what_arrives_does_not_depend_on_when_one_looks(quality: Quality, seed: 
     for ugv in range(3):
         mine = [delivery for delivery in whole.arrived if delivery.message.ugv == ugv]
         assert quality.reorder or [d.order for d in mine] == sorted(d.order for d in mine)
+        own = tuple(message for message in sent if message.ugv == ugv)  # other UGVs' messages hold up none
+        alone = [d.received_s for d in link.carry(Transit(), own, 99.0).arrived]
+        assert [d.received_s for d in mine] == alone
         assert (whole.newest[ugv].order if mine else None) == max((d.order for d in mine), default=None)
 
 

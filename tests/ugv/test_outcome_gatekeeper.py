@@ -116,13 +116,15 @@ def test_an_accepted_proposal_is_over_with_its_motion_or_after_the_longest_try(e
         assert team.memory.answers[0] == ACCEPT
     assert team.t == pytest.approx(min(end, 5.05), abs=0.051)  # the longest try of 5 s begins at the first sample
     assert [decision.reason for decision in team.memory.decisions] == ["over"]
-    for _ in range(3):
+    for k in range(1, 4):  # also while another UGV decides
         assert team.memory.answers[0] == answer
-        assert not team.sees(proposal).executing
+        assert not team.sees(proposal, other=Proposal("way", 0.0, STAYS, number=k)).executing
+    assert Patience(1, 2.0, 5.0).rested(Commitment(tries=1, since=1.0), 3.0).tries == 0
 
 
-def test_a_proposal_that_comes_after_its_motion_is_over_and_costs_no_try() -> None:
+@pytest.mark.parametrize("end", [0.0, 0.05])
+def test_a_proposal_that_comes_after_its_motion_is_over_and_costs_no_try(end: float) -> None:
     team = Team()
-    turn = team.sees(Proposal("way", 0.0, Motion(np.array([-2.0, team.t]), STAYS.positions), cause="other", number=0))
+    turn = team.sees(Proposal("way", 0.0, Motion(np.array([-2.0, end]), STAYS.positions), cause="other", number=0))
     assert (turn.executing, turn.tries, team.memory.answers[0]) == (False, 0, DONE)
     assert [decision.reason for decision in team.memory.decisions] == ["over"]

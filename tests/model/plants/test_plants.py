@@ -20,6 +20,7 @@ from airground_drake.model.bodies.world import Body
 from airground_drake.model.plants.budget import AT_REST, Bounds, costs, law_distance
 from airground_drake.model.plants.delay import Delay
 from airground_drake.model.plants.lag import Lag
+from airground_drake.model.plants.plant import Recorded
 from airground_drake.model.plants.steering import steer
 from airground_drake.model.plants.unicycle import Unicycle
 from airground_drake.scenario.load import load
@@ -111,6 +112,9 @@ def test_a_lag_and_a_delay_obey_their_equations(seed: int, lag: float, periods: 
         for part, there in zip((0.4, 1.0), solved, strict=True):
             found = plant.at(memory, base + part * H * velocity, velocity, part * H)
             np.testing.assert_allclose(found[[0, 1, 3, 4]], there, atol=1e-9)
+        ends = np.insert(np.stack([due, solved[-1]]), [2, 4], 0.0, axis=1)
+        bent = np.linalg.norm(solved[0, :2] - 0.6 * due[:2] - 0.4 * solved[-1, :2])
+        assert bent <= plant.bends_m(np.array([0.0, H]), ends)[0] + 1e-10
         due, memory, base = solved[-1], plant.remembered(memory, velocity, H), base + H * velocity
 
 
@@ -240,6 +244,13 @@ def test_its_target_straight_behind_it_stands_for_ever_but_for_a_little_aside_it
         assert {each.status for each in judge(trace, ["SAFE-TRACE", "SAFE-HYP"])} == {"holds"}
         found.append(float(np.linalg.norm(trace.position("ugv1")[-1] - [10.0, 0.0, 0.0])))
     assert found == pytest.approx([10.3, 0.0], abs=0.02)  # half a step past its target, it may not come back
+
+
+def test_a_hand_point_dips_by_turns_on_the_spot_too() -> None:
+    plant, ends = Unicycle(0.2, H), np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.3]])
+    turning = Recorded(H * np.arange(2), ends, np.array([0]), np.array([1]), np.zeros(1), np.empty((1, 0)), 1.0)
+    (dip,) = (premise for premise in plant.premises(turning) if premise.name == "dip of the hand point")
+    assert plant.bounds(1.0).dip_m - dip.margin[0] == pytest.approx(0.2 * 0.3**2 / 8.0)
 
 
 def test_a_run_that_goes_backwards_breaks_the_hypothesis_that_it_does_not() -> None:

@@ -21,6 +21,8 @@ from airground_drake.report.possible import impossible
 from airground_drake.scenario.budget import budget
 from airground_drake.scenario.load import from_data, load, resolved
 from airground_drake.scenario.schema import ERRORS, Scenario
+from airground_drake.scenario.sensing import errors_of
+from airground_drake.scenario.world import make_world
 from airground_drake.sim.diagram import make_monitor
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
@@ -85,6 +87,27 @@ def test_what_robots_act_on_is_recorded_within_its_bound(errors: str) -> None:
         assert 0.0 < np.linalg.norm(saw - true[k, :2], axis=1).max() <= 0.03
 
 
+def test_of_what_is_as_near_but_for_rounding_the_first_counts() -> None:
+    scenario = crossing({"twin": {"position_m": [2.5, 4.3, 0.0], "radius_m": 0.3}}, errors="away")
+    errors, places = (
+        errors_of(scenario, make_world(scenario)),
+        np.array([[2.5, 2.3 + 1e-11, 0.0], [-9.0] * 3, [9.0] * 3]),
+    )
+    assert errors is not None
+    assert errors.published(0.0, places)[0, 1] > 2.3 + 0.9 * ERROR_M  # away from the rock, not from its nearer twin
+
+
+def test_an_adversary_changes_its_mind_at_the_sample_whatever_its_rounding() -> None:
+    scenario = crossing(errors="adversarial")
+    errors, places = (
+        errors_of(scenario, make_world(scenario)),
+        np.array([[-5.0, 0.0, 0.0], [0.0, -5.0, 0.0], [9.0] * 3]),
+    )
+    assert errors is not None
+    for turn in 0.5 * np.arange(1.0, 9.0):
+        assert np.array_equal(errors.published(np.nextafter(turn, 0.0), places), errors.published(turn, places))
+
+
 def test_robots_that_measure_each_other_pay_for_different_directions(monkeypatch: pytest.MonkeyPatch) -> None:
     scenario, claims = crossing(errors="adversarial", shared=False, seed=5), ("SAFE-TRACE", "SAFE-HYP")
     trace = simulate(scenario, "a")
@@ -92,6 +115,7 @@ def test_robots_that_measure_each_other_pay_for_different_directions(monkeypatch
     assert found(trace, *claims) == dict.fromkeys(claims, "holds")
     assert safety.safe_hyp(checked(trace)).status == "holds"
     assert [*impossible(trace, scenario)] == []
+    assert not trace.as_seen("uav", "ugv1")[:, 2].any()
     pair = pair_of(trace, "ugv1", "ugv2")
     missed = max(kept.missed_m.max() for kept in guarantees(trace) if kept.pair == pair)
     assert 0.0 < missed < 0.002  # by the better view of each sample; either view alone misses more than 0.007 m
