@@ -10,10 +10,10 @@ from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.outlines import CORNERS, COUNT, MIDDLE, Cores
 from airground_drake.verify.runs.demands import outlines_of
 from airground_drake.verify.runs.pairs import carried
-from airground_drake.verify.runs.proposals import intervening, proposals_of
+from airground_drake.verify.runs.proposals import proposals_of
 from oracles.channel import has_channel
 from oracles.fault import Fault
-from oracles.protocol import answers_to, known_answers, lost_s, parties, withdrawn_s
+from oracles.protocol import answers_to, known_answers, withdrawn_s
 from oracles.sensing import are_same, are_there, beyond_range, still_parts
 
 SENSED_M = 1e-9
@@ -23,26 +23,7 @@ Part = tuple[float, ...]
 
 
 def wrong_messages(trace: Trace) -> list[Fault]:
-    return [*_out_of_turn(trace), *_answered_otherwise(trace), *_wrong_maps(trace)]
-
-
-def _out_of_turn(trace: Trace) -> Iterator[Fault]:
-    """Messages while nobody was being intervened on: the UGV, the UGV that it was to make way for, or another party.
-
-    After a release the UAV withdraws its proposal at its next planning instant, and the gatekeeper notices at its next
-    sample: one period each is allowed. A UAV that is lost withdraws nothing: then decisions go on to the motion's end.
-    """
-    allowance = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s
-    for sent in proposals_of(trace):
-        spans = np.concatenate([intervening(trace, ugv) for ugv in parties(trace, sent)])
-        begins, ends = spans[:, 0] - TIME_TOLERANCE_S, spans[:, 1] + allowance + TIME_TOLERANCE_S
-        if lost_s(trace, sent) <= sent.times_s[-1]:
-            ends = np.maximum(ends, sent.times_s[-1] + allowance)
-        messages = [("proposal", sent.issued_s)]
-        if not has_channel(trace):
-            messages += [("decision", answer.t_s) for answer in answers_to(trace, sent)]
-        if wrong := [(kind, t) for kind, t in messages if not ((t >= begins) & (t <= ends)).any()]:
-            yield Fault(f"{wrong[0][0]} while nobody needs it", sent.ugv, wrong[0][1])
+    return [*_answered_otherwise(trace), *_wrong_maps(trace)]
 
 
 def _answered_otherwise(trace: Trace) -> Iterator[Fault]:

@@ -1,4 +1,4 @@
-"""The gatekeeper's decisions as its code has to make them: situations, answers, times, and the bounds of its routes.
+"""The gatekeeper's decisions as its code has to make them: situations, answers, and the bounds of its routes.
 
 GATE-PLAN judges plans for the problem that was recorded. Here that problem is compared with the run, the answer with
 the rules, and what a route says of its own plan with bounds of the optimum.
@@ -25,9 +25,7 @@ from airground_drake.verify.runs.gate_record import (
     rows_of,
 )
 from airground_drake.verify.runs.pairs import pairs_beside, preset_of
-from airground_drake.verify.runs.proposals import GATED_METHODS, intervening, proposal_of, proposals_of
 from oracles.beginnings import movers
-from oracles.channel import has_channel, held
 from oracles.fault import Fault
 from oracles.sensing import place_of, sensed, still_parts
 
@@ -47,49 +45,14 @@ PROVED_ROUTES = ("mixed_integer",)
 
 
 def wrong_decisions(trace: Trace) -> list[Fault]:
-    """Everything about the decisions of a run that is not as it should be."""
-    if trace.meta["method"] not in GATED_METHODS:
+    """Everything about the decisions of a run under (c) that is not as it should be."""
+    if trace.meta["method"] not in ON_TOP:
         return []
     rows = rows_of(trace)
-    compared = [*compare_times(trace, rows)]
-    if trace.meta["method"] in ON_TOP:
-        compared += [one for row in rows for one in compare_situation(trace, row)]
-        compared += compare_answers(trace, rows)
-        compared += compare_routes(trace, [row for row in rows if row.planned])
+    compared = [one for row in rows for one in compare_situation(trace, row)]
+    compared += compare_answers(trace, rows)
+    compared += compare_routes(trace, [row for row in rows if row.planned])
     return [Fault(one.what, one.row.robot, one.row.t_s, one.off) for one in compared if one.wrong]
-
-
-def compare_times(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:
-    """The first decision is within a period of the proposal, the others a period apart; none that is due is missing."""
-    period = trace.scenario.gatekeeper.period_s
-    for row, last in in_turn(trace, rows):
-        first = row.given["issued_s"]
-        if has_channel(trace):
-            first = held(trace, proposal_of(trace, row.number))[0]
-        early = first if last is None else last.t_s + period
-        late = early + period if last is None else early
-        yield Deviation(row, "a decision is missing before this one, s", max(0.0, row.t_s - late), TIME_TOLERANCE_S)
-        yield Deviation(row, "a decision too many, s", max(0.0, early - row.t_s), TIME_TOLERANCE_S)
-    yield from compare_proposals(trace, rows)
-
-
-def compare_proposals(trace: Trace, rows: Sequence[DecisionRecord]) -> Iterator[Deviation]:
-    """A proposal that stands for a period of the planner and one of the gatekeeper is decided on.
-
-    It does not stand so long if another one is sent meanwhile, if its motion is over, if neither the UGV nor its cause
-    is intervened on all the time, or if the run ends.
-    """
-    allowed = trace.scenario.intervention.period_s + trace.scenario.gatekeeper.period_s + TIME_TOLERANCE_S
-    decided = {row.given["number"] for row in rows}
-    sent = proposals_of(trace)
-    for one in [] if has_channel(trace) else sent:
-        until = one.issued_s + allowed
-        stays = np.concatenate([intervening(trace, ugv) for ugv in sorted({one.ugv, one.cause})])
-        called = ((stays[:, 0] <= one.issued_s + TIME_TOLERANCE_S) & (stays[:, 1] > until)).any()
-        replaced = any(other.ugv == one.ugv and one.issued_s < other.issued_s <= until for other in sent)
-        if called and not replaced and one.times_s[-1] > until:
-            row = DecisionRecord({"t_s": one.issued_s, "robot": one.ugv})
-            yield Deviation(row, "nothing is decided on a proposal", float(one.number not in decided), 0.0)
 
 
 def compare_situation(trace: Trace, row: DecisionRecord) -> Iterator[Deviation]:

@@ -44,14 +44,9 @@ def _executed_otherwise(trace: Trace) -> Iterator[Fault]:
 
 
 def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
-    """Messages of the trace that are not those of its proposals and decisions, or not withdrawn when they should be."""
+    """Answers that are not read, and proposals that are not withdrawn, when they should be."""
     table, ends = trace.messages, trace.t[-1] - TIME_TOLERANCE_S
-    of = {kind: table[table["kind"] == kind] for kind in ("proposal", "withdrawal", "answer")}
-    told = trace.decisions["answer"][trace.decisions["answer"] >= 0]
-    numbers = sorted({*of["answer"]["number"]} if has_channel(trace) else of["answer"]["number"])
-    lacking = {*told} - {*numbers} if has_channel(trace) else len(told) != len(numbers)
-    if numbers != [*range(len(numbers))] or lacking:
-        yield Fault("answers are not those of the decisions")
+    of = {kind: table[table["kind"] == kind] for kind in ("withdrawal", "answer")}
     period_s, read = trace.scenario.intervention.period_s, of["answer"].dropna(subset="read_s")
     waited_s = (read["read_s"] - read["sent_s"]).to_numpy(dtype=np.float64)
     if has_channel(trace):
@@ -60,8 +55,6 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
         yield Fault("answers are not read at the next planning instant")
     withdrawn = of["withdrawal"].groupby("about")["sent_s"].min().to_dict()
     for sent in proposals_of(trace):
-        if sent.number not in {*of["proposal"]["number"]}:
-            yield Fault("a proposal is no message", sent.ugv, sent.issued_s)
         due, recorded = withdrawn_s(trace, sent), withdrawn.get(sent.number, np.inf)
         due = due if due < lost_s(trace, sent) - TIME_TOLERANCE_S else np.inf  # nobody is left to say so
         if min(due, ends) != min(recorded, ends) and abs(due - recorded) > TIME_TOLERANCE_S:
@@ -69,24 +62,12 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
 
 
 def _misused(trace: Trace) -> Iterator[Fault]:
-    """Wrong senders and causes, joint plans not sent whole, decisions on what is over, needless replacements."""
+    """Answers to a UAV that is lost, and needless replacements."""
     every, scenario = proposals_of(trace), trace.scenario
     heard = trace.messages[trace.messages["kind"] == "answer"].dropna(subset="read_s")
     for uav, read_s in zip(heard["receiver"], heard["read_s"], strict=True):
         if read_s > (scenario.aerial[uav].lost_at_s or np.inf) - TIME_TOLERANCE_S:
             yield Fault("an answer is read by a UAV that is lost", uav, read_s)
-    for sent in every:
-        if not {sent.ugv, sent.cause, *sent.party} <= {*scenario.in_charge(sent.sender)}:
-            yield Fault("sent by a UAV that is not in charge", sent.ugv, sent.issued_s, sent.sender)
-        if sent.issued_s > lost_s(trace, sent) - TIME_TOLERANCE_S:
-            yield Fault("sent by a UAV that is lost", sent.ugv, sent.issued_s, sent.sender)
-        if not _is_cause(trace, sent):
-            yield Fault("sent for a UGV that is not intervened on", sent.ugv, sent.issued_s, sent.cause)
-        if missing := {*sent.party} - {sent.ugv, *(part.ugv for part in parts_of(trace, sent))}:
-            yield Fault("part of a joint plan not sent", sent.ugv, sent.issued_s, sorted(missing))
-        end = held_until(trace, sent)
-        if late := [answer.t_s for answer in answers_to(trace, sent) if answer.t_s > end + TIME_TOLERANCE_S]:
-            yield Fault("decision on what was withdrawn", sent.ugv, late[0], end)
     for ugv in trace.ugvs:
         for before, after in pairwise(sent for sent in every if sent.ugv == ugv):
             t, row = after.issued_s + TIME_TOLERANCE_S, row_at(trace, after.issued_s)
@@ -95,17 +76,6 @@ def _misused(trace: Trace) -> Iterator[Fault]:
             alone = not (after.party or others) and after.cause == ugv
             if alone and withdrawn_s(trace, before, unless_replaced=True) > t and before.times_s[-1] > t:
                 yield Fault("replaced while in force", ugv, after.issued_s, after.policy)
-
-
-def _is_cause(trace: Trace, sent: ProposalRecord) -> bool:
-    """Whether the cause is intervened on, and the UGV itself only if it is the cause.
-
-    The mode of a row is in force up to it. A trigger may be at that very instant, so the mode of the next row counts,
-    too.
-    """
-    row = row_at(trace, sent.issued_s)
-    called = {name: trace.column(f"{name}.mode")[row : row + 2] == 1.0 for name in (sent.ugv, sent.cause)}
-    return bool(called[sent.cause].any()) and (sent.cause == sent.ugv or not called[sent.ugv].all())
 
 
 def lost_s(trace: Trace, sent: ProposalRecord) -> float:

@@ -5,15 +5,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from builders.decisions import ALL_PLANS, STAGES, GateData
-from builders.edits import with_decision, with_meta
+from builders.edits import with_decision
 from hypothesis import given
 from hypothesis import strategies as st
 from verify.runs.cases import (
     B_C,
-    B_D,
     BINARY,
     BLOCKS,
     LOCAL,
@@ -25,7 +23,6 @@ from verify.runs.cases import (
     both,
     column,
     decision,
-    kept,
     problem,
     swapped,
 )
@@ -35,7 +32,6 @@ from airground_drake.sim.trace import Trace
 from airground_drake.uav.messages import ACCEPT, REFUSE, SILENT
 from airground_drake.ugv.answer import Rules, settle
 from airground_drake.ugv.solution import Solution
-from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.claims.gate_plan import Bounded, bound
 from airground_drake.verify.runs.gate_record import POSITION_TOLERANCE_M, DecisionRecord, rows_of
 from oracles.decisions import GAP_TOLERANCE, OVERSTATED, UNDERSTATED, rule, wrong_decisions
@@ -89,28 +85,6 @@ def beside_the_best(data: GateData) -> Any:
     return np.where(np.arange(STAGES) == STAGES // 2, 1.0 - best, best)
 
 
-def undecided(trace: Trace) -> Trace:
-    silent = (trace.decisions["issued_s"] != trace.decisions["issued_s"].min()).to_numpy()
-    left = replace(trace, decisions=trace.decisions[silent])
-    return replace(left, problems=trace.problems[silent]) if len(trace.problems) else left
-
-
-def sent(*given: tuple[str, float, float]) -> Edit:
-    """Proposals more, (to whom, when, end of the motion), while ugv1 is intervened on and nothing is in force."""
-
-    def edit(trace: Trace) -> Trace:
-        one = trace.proposals.iloc[0].to_dict()
-        table = [
-            {**one, "number": 90 + k, "robot": ugv, "issued_s": t, "times_s": [t, end], "positions_m": [0.0] * 6}
-            for k, (ugv, t, end) in enumerate(given)
-        ]
-        told = [{"t_s": t, "robot": ugv, "kind": "proposal", "policy": one["policy"]} for ugv, t, _ in given]
-        more = with_meta(trace, events=[*trace.events, *told])
-        return replace(more, proposals=pd.concat([trace.proposals, pd.DataFrame(table)], ignore_index=True))
-
-    return edit
-
-
 FAULTY: tuple[tuple[str, str, Edit, str], ...] = (
     ("obstacle forgotten", RELAXED, without_point, "left out"),
     ("moving robot stands", SWAP, problem(9, centres_m=lambda v: np.tile(v[: len(v) // 60], 60)), "UGV senses"),
@@ -119,17 +93,6 @@ FAULTY: tuple[tuple[str, str, Edit, str], ...] = (
     ("contrary answer", RELAXED, column(decision=swapped), "answer or reason"),
     ("reason", RELAXED, column(reason="dwell"), "answer or reason"),
     ("rounded nevertheless", BINARY, column(rounding_deviation_s=0.0), "a relaxation that the route has not"),
-    ("first one lost", RELAXED, kept(*range(1, 11)), "missing"),
-    ("one lost", RELAXED, kept(0, 1, *range(3, 11)), "missing"),
-    ("one twice", RELAXED, kept(0, 1, 1, *range(2, 11)), "too many"),
-    ("undecided", B_C, undecided, "nothing is decided"),
-    ("undecided under (d)", B_D, undecided, "nothing is decided"),
-    ("another one undecided", B_D, sent(("ugv1", 11.5, 99.0)), "nothing is decided"),
-    ("making way undecided", B_D, sent(("ugv2", 11.5, 99.0)), "nothing is decided"),
-    ("over at once", B_D, sent(("ugv1", 11.5, 11.55)), ""),
-    ("replaced at once", B_D, sent(("ugv1", 11.5, 99.0), ("ugv1", 11.55, 11.6)), ""),
-    ("released at 15.36 s", B_D, sent(("ugv1", 15.3, 99.0)), ""),
-    ("released, making way", B_D, sent(("ugv2", 15.3, 99.0)), ""),
     ("loser inflated", RELAXED, column(objective_accept=lambda v: 2.0 * v, objective_refuse=lambda v: 2.0 * v),
      "throughout"),
     ("worst plan", RELAXED, other_plan(worst, bounded=False), "objective above"),
@@ -173,7 +136,6 @@ def with_bound(worked_out: Callable[[Bounded, float], float]) -> Edit:
 
 
 TOLERANCES: tuple[tuple[str, float, Callable[[Trace, float], Trace], str], ...] = (
-    (B_D, TIME_TOLERANCE_S, moved("t_s"), "a decision"),
     (B_C, POSITION_TOLERANCE_M, changed("initial_m", 0), "initial position"),
     (B_C, POSITION_TOLERANCE_M, changed("reference_m", -2), "reference"),
     (B_C, POSITION_TOLERANCE_M, changed("centres_m", 0), "point"),

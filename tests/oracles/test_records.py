@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from builders.edits import bumped, moved, with_events, with_meta, with_scenario
+from builders.edits import bumped, moved, with_meta, with_scenario
 from verify.judging import decided
 from verify.runs.cases import (
     A_D,
     B_C,
     B_D,
-    DOORWAY,
     JOINT,
     Edit,
     accepted,
@@ -70,37 +69,12 @@ def told(row: int, some: slice = slice(None), by: float = 0.0, wider: float = 0.
     return proposals(edit)
 
 
-def with_proposal(**changes: Any) -> Edit:
-    def edit(trace: Trace) -> Trace:
-        more = trace.proposals.iloc[[-1]].assign(number=90, **changes)
-        event = {"t_s": float(more["issued_s"].iloc[0]), "robot": more["robot"].iloc[0], "kind": "proposal",
-                 "policy": more["policy"].iloc[0]}  # fmt: skip
-        table = pd.concat([trace.proposals, more], ignore_index=True)
-        return replace(with_meta(trace, events=[*trace.events, event]), proposals=table)
-
-    return edit
-
-
 def sent_again(trace: Trace) -> Trace:
-    return with_proposal(issued_s=trace.proposals["issued_s"].iloc[-1] + 0.2)(trace)
-
-
-def part_lost(trace: Trace) -> Trace:
-    gone = trace.proposals.iloc[int(np.argmax([len(party) for party in trace.proposals["party"]]))]
-    assert len(gone["party"]) > 1
-    of = ("proposal", gone["robot"], float(gone["issued_s"]))
-    left = with_events(trace, lambda every: [e for e in every if (e["kind"], e["robot"], float(e["t_s"])) != of])
-    tables = {name: getattr(trace, name) for name in ("proposals", "decisions")}
-    return replace(left, **{k: v[v["number"] != gone["number"]].reset_index(drop=True) for k, v in tables.items()})
-
-
-def one_more(where: Callable[[pd.DataFrame], Any], later_s: float) -> Edit:
-    def edit(trace: Trace) -> Trace:
-        row = trace.decisions[where(trace.decisions)].iloc[[-1]]
-        later = row.assign(t_s=row["t_s"] + later_s)
-        return replace(trace, decisions=pd.concat([trace.decisions, later], ignore_index=True))
-
-    return edit
+    last = trace.proposals.iloc[[-1]]
+    more = last.assign(number=90, issued_s=last["issued_s"] + 0.2)
+    event = {"kind": "proposal", "t_s": float(more["issued_s"].iloc[0])} | more.iloc[0][["robot", "policy"]].to_dict()
+    table = pd.concat([trace.proposals, more], ignore_index=True)
+    return replace(with_meta(trace, events=[*trace.events, event]), proposals=table)
 
 
 def cut_short(trace: Trace) -> Trace:
@@ -131,20 +105,12 @@ RECORDS: dict[str, tuple[tuple[str, str, Edit, str], ...]] = {
     "protocol": (
         ("accepted without a message", B_D, bumped("ugv2.executing", 1.0, 101), "executes another proposal"),
         ("acceptance hidden", B_D, lambda t: bumped("ugv1.executing", -1.0, acting(t))(t), "executes another proposal"),
-        ("cause not intervened on", B_D, proposals(lambda table: table.assign(cause="ugv2")), "sent for a UGV"),
-        ("refused and not withdrawn", B_D, one_more(refused, 1.0), "decision on what was withdrawn"),
         ("sent again", B_D, sent_again, "replaced while in force"),
-        ("part of a joint plan", DOORWAY, part_lost, "part of a joint plan not sent"),
         ("not withdrawn", B_D, messages(lambda table: table[table["kind"] != "withdrawal"]), "withdrawn at another"),
         ("withdrawn later", B_D, later("withdrawal", 0.05), "withdrawn at another time"),
         ("read too late", B_D, messages(lambda table: table.assign(read_s=table["read_s"] + 1)), "answers are not"),
-        ("an answer not sent", B_D, messages(lambda table: table.drop(index=1)), "answers are not those"),
-        ("a proposal not sent", B_D, messages(lambda table: table.drop(index=0)), "a proposal is no message"),
     ),
     "communication": (
-        ("proposal before the trigger", B_D, with_proposal(issued_s=5.0), "proposal while nobody needs it"),
-        ("to the other UGV", B_D, with_proposal(robot="ugv2", cause="ugv2"), "proposal while nobody needs it"),
-        ("decision after the release", B_D, one_more(executing, 0.2), "decision while nobody needs it"),
         ("kept and told", B_D, lambda t: replace(t, decisions=t.decisions.assign(answer=7)), "answers out of turn"),
         ("another answer, not told", B_D, first(refused, answer=-1), "answers out of turn"),
         ("map before the answer", B_D, told(0), "map of a proposal"),

@@ -19,7 +19,7 @@ SIXTH = 5
 """The decision that is edited: the best plan there changes its mode."""
 
 A, D, JOINT = "synthetic a", "synthetic d", "dead end"
-A_D, B_C, B_D, DOORWAY, SWAP = "case_a d", "case_b c", "case_b d", "doorway d", "swap c"
+A_D, B_C, B_D, SWAP = "case_a d", "case_b c", "case_b d", "swap c"
 RELAXED, BINARY, LOCAL, BLOCKS = "relaxed", "mixed_integer", "nonlinear", "blocks"
 SYNTHETIC: dict[str, Callable[[], Trace]] = {
     A: lambda: run_of("a"), D: lambda: run_of("d"), "refractory": refractory, "leaking": leaking,
@@ -99,17 +99,6 @@ def problem(row: int = SIXTH, **arrays: Callable[[Any], Any]) -> Edit:
 def column(**values: Any) -> Edit:
     """Values of a decision, set or called with what is there."""
     return decision(lambda row, _: row.update({k: v(row[k]) if callable(v) else v for k, v in values.items()}))
-
-
-def kept(*numbers: int) -> Edit:
-    """These decisions only, in this order, with their problems."""
-
-    def edit(trace: Trace) -> Trace:
-        return replace(
-            trace, decisions=trace.decisions.iloc[list(numbers)], problems=trace.problems.iloc[list(numbers)]
-        )
-
-    return edit
 
 
 def at(index: Any, value: Any) -> Callable[[Any], Any]:
