@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 SHOWN_S = 0.01  # shorter parts get no line, s
-_FORMAT = "{desc} {percentage:3.0f}% |{bar}| {n:.4g}/{total:.4g} {unit}, {elapsed}, {remaining} left{postfix}"
+_FORMAT = "{desc} {percentage:3.0f}% |{bar}| {n:,.7g}/{total:,.7g} {unit}, {elapsed}, {remaining} left{postfix}"
 _WITHOUT_AMOUNT = "{desc} {elapsed}{postfix}"
 TOLD_S = 3.0  # where standard error is no terminal, a stage that lasts longer gets one line, s
 
@@ -52,7 +52,7 @@ class ProgressBar(Progress):
     def stage(self, name: str, amount: float = 0.0, unit: str = "") -> None:
         self.close()
         self._stage, self._since, self._done = name, time.perf_counter(), 0.0
-        self._of = f" of {amount:.4g} {unit}" if amount else ""
+        self._of = f" of {amount:,.7g} {unit}" if amount else ""
         self._waits_for_line = self._shows_stages
         if self._shows_bar:
             self._bar = _bar(name, amount, unit)
@@ -63,7 +63,7 @@ class ProgressBar(Progress):
             self._done += amount
             if self._waits_for_line and time.perf_counter() - self._since >= TOLD_S:
                 self._waits_for_line = False
-                print(f"{self._stage}: {self._done:.4g}{self._of} done", file=sys.stderr, flush=True)
+                print(f"{self._stage}: {self._done:,.7g}{self._of} done", file=sys.stderr, flush=True)
             if self._bar is not None:
                 self._bar.set_postfix_str(what, refresh=False)
                 self._bar.update(amount)

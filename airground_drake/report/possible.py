@@ -291,7 +291,7 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
     runs_out_s = {number: times[-1] for number, times in trace.proposals[["number", "times_s"]].to_numpy()}
     arrived = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s")
     sent = arrived.sort_values("received_s", kind="stable")
-    due, samples = set[tuple[int, int]](), math.ceil(ends_s / period_s - SAME_S)
+    due, allowed = set[tuple[int, int]](), set[tuple[int, int]]()
     for ugv in trace.ugvs:
         news_of = sent[sent["receiver"] == ugv]
         mine = [*zip(*(news_of[name].tolist() for name in ("received_s", "about", "kind")), strict=True)]
@@ -302,9 +302,12 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
             # what the UAV sends at a sample the UGV has at the next one; what a channel delivers then perhaps at once
             until = next(over, ends_s) / period_s
             until = math.ceil(until - SAME_S) if scenario.channel else int(until + SAME_S) + 1
-            until = min(until, samples, math.ceil(runs_out_s.get(about, ends_s) / period_s - SAME_S) + 1)
-            due |= {(about, sample) for sample in range(int(at_s / period_s + SAME_S) + 1, until)}
-    for number, at in sorted(due - decided if scenario.channel else due ^ decided):
+            until, last = min(until, math.ceil(ends_s / period_s - SAME_S)), runs_out_s.get(about, ends_s) / period_s
+            # rounding decides whether a motion that ends at a sample has run out there
+            for these, runs_out in ((due, last - SAME_S), (allowed, last + SAME_S)):
+                samples = range(int(at_s / period_s + SAME_S) + 1, min(until, math.ceil(runs_out) + 1))
+                these |= {(about, sample) for sample in samples}
+    for number, at in sorted((due - decided) | (decided - allowed if scenario.channel is None else set())):
         found = ("nothing", "one") if (number, at) in due else ("one", "nothing")
         yield f"decision on proposal {number}", at * period_s, *found
 

@@ -152,6 +152,11 @@ def test_of_an_honest_run_nothing_is_said(method: str) -> None:
     assert [*impossible(run(method), run(method).scenario)] == []
 
 
+def test_a_motion_that_ends_at_a_sample_may_have_run_out_there_or_not() -> None:
+    honest = simulate(load("bayes_threshold", ["duration_s=25.0", "seed=375"]), "d_printed")
+    assert [*impossible(honest, honest.scenario)] == []
+
+
 def test_without_a_channel_answers_are_those_of_decisions_and_a_lost_uav_is_silent() -> None:
     honest = simulate(load("two_uavs", {"duration_s": 12.0}), "d")
     assert [*impossible(honest, honest.scenario)] == []
