@@ -275,7 +275,7 @@ def _executed(trace: Trace, scenario: Scenario) -> Wrong:
 
 
 def _decided(trace: Trace, scenario: Scenario) -> Wrong:
-    """A gatekeeper decides at each of its samples on what its UGV holds, until its motion has run out."""
+    """A gatekeeper decides at each of its samples on what its UGV holds, at least until its motion has run out."""
     if not method_of(trace.meta["method"]).gated:
         return
     period_s, ends_s = scenario.gatekeeper.period_s, float(trace.t[-1])
@@ -302,11 +302,10 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
             # what the UAV sends at a sample the UGV has at the next one; what a channel delivers then perhaps at once
             until = next(over, ends_s) / period_s
             until = math.ceil(until - SAME_S) if scenario.channel else int(until + SAME_S) + 1
-            until, last = min(until, math.ceil(ends_s / period_s - SAME_S)), runs_out_s.get(about, ends_s) / period_s
-            # rounding decides whether a motion that ends at a sample has run out there
-            for these, runs_out in ((due, last - SAME_S), (allowed, last + SAME_S)):
-                samples = range(int(at_s / period_s + SAME_S) + 1, min(until, math.ceil(runs_out) + 1))
-                these |= {(about, sample) for sample in samples}
+            held = range(int(at_s / period_s + SAME_S) + 1, min(until, math.ceil(ends_s / period_s - SAME_S)))
+            allowed |= {(about, sample) for sample in held}
+            runs_out = math.ceil(runs_out_s.get(about, ends_s) / period_s - SAME_S)
+            due |= {(about, sample) for sample in held if sample <= runs_out}
     for number, at in sorted((due - decided) | (decided - allowed if scenario.channel is None else set())):
         found = ("nothing", "one") if (number, at) in due else ("one", "nothing")
         yield f"decision on proposal {number}", at * period_s, *found

@@ -152,8 +152,11 @@ def test_of_an_honest_run_nothing_is_said(method: str) -> None:
     assert [*impossible(run(method), run(method).scenario)] == []
 
 
-def test_a_motion_that_ends_at_a_sample_may_have_run_out_there_or_not() -> None:
-    honest = simulate(load("bayes_threshold", ["duration_s=25.0", "seed=375"]), "d_printed")
+@pytest.mark.parametrize(
+    "given", [("duration_s=25.0", "seed=375"), ("duration_s=10.0", "seed=45", "intervention.period_s=0.1")]
+)
+def test_decisions_go_on_until_the_uav_withdraws_a_motion_that_has_run_out(given: tuple[str, ...]) -> None:
+    honest = simulate(load("bayes_threshold", given), "d_printed")
     assert [*impossible(honest, honest.scenario)] == []
 
 
