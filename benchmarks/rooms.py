@@ -19,7 +19,6 @@ import orca
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.parallel import run_parallel
-from airground_drake.model.geometry.motion import Motion
 from airground_drake.report.metrics import outcome
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.schema import Scenario
@@ -105,19 +104,11 @@ def run(seed: int, robots: str, way: str) -> Run:
 def by_orca(scenario: Scenario, radius: float, around: list[Array]) -> Run:
     """The same by ORCA, for discs of this radius."""
     ugvs, half = list(scenario.ugvs.values()), 0.5 * SAFE_M
-    presets = [Motion.at_speed(np.array(ugv.preset.waypoints_m), ugv.preset.speed_m_s) for ugv in ugvs]
-
-    def preset(i: int, t: float) -> tuple[Array, Array]:
-        place, rate = presets[i].at(t)
-        return place[:2], rate[:2]
-
-    def corners(low: Array, high: Array) -> Array:
-        return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
-
-    hall = corners(half - np.array(HALF_M), np.array(HALF_M) - half)[::-1]
+    hall = orca.box(half - np.array(HALF_M), np.array(HALF_M) - half)[::-1]
     starts, targets = (np.array([getattr(ugv, name)[:2] for ugv in ugvs]) for name in ("start_m", "target_m"))
     traffic = orca.Traffic(
-        starts, radius + half, MOST_M_S, preset, [hall, *(corners(low - half, high + half) for low, high in around)],
+        starts, radius + half, MOST_M_S, orca.presets_of(scenario),
+        [hall, *(orca.box(low - half, high + half) for low, high in around)],
         np.empty((0, 1, 2)), 0.0, scenario.seed,
     )  # fmt: skip
     t, places = orca.driven(traffic, DURATION_S)

@@ -26,6 +26,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.parallel import run_parallel
+from airground_drake.base.registry import method_of
 from airground_drake.model.plants.budget import Bounds, law_distance, least_gain
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.schema import Scenario, Sensing
@@ -106,9 +107,8 @@ def _is_free(places: Array, discs: Array, room_m: float) -> bool:
     return bool(between.min() > room_m and beside.min() > room_m)
 
 
-def least_apart(way: Array, other: Array) -> float:
-    """The least distance of two points on straight ways between the same instants, (T, 2), m."""
-    apart = way - other
+def least_apart(apart: Array) -> float:
+    """The least distance of two points that are apart by (T, 2), m, and go straight between the instants."""
     start, change = apart[:-1], np.diff(apart, axis=0)
     squared = np.einsum("ij,ij->i", change, change)
     along = -np.einsum("ij,ij->i", start, change)
@@ -119,11 +119,8 @@ def least_apart(way: Array, other: Array) -> float:
 def shortest(ways: Array, discs: Array) -> tuple[float, float]:
     """The least distances between UGVs, and from the edges of discs, m; ways (T, n, 2)."""
     count = ways.shape[1]
-    pairs = min(least_apart(ways[:, i], ways[:, j]) for i in range(count) for j in range(i))
-    beside = min(
-        least_apart(ways[:, i], np.broadcast_to(disc[:2], ways[:, i].shape)) - disc[2]
-        for i in range(count) for disc in discs
-    )  # fmt: skip
+    pairs = min(least_apart(ways[:, i] - ways[:, j]) for i in range(count) for j in range(i))
+    beside = min(least_apart(ways[:, i] - disc[:2]) - disc[2] for i in range(count) for disc in discs)
     return pairs, beside
 
 
@@ -139,7 +136,7 @@ def driven(draw: Draw, law_of: str) -> Array:
     if law_of == "one-error":  # beside another robot
         pair = law_distance(draw.promised_m, Bounds(error_m=draw.error_m), gain=1.0)
         near = near._replace(distance=np.where(near.share < 1.0, np.minimum(near.distance, pair), near.distance))
-    law = components.make_law(built, components_method(), "augmented")
+    law = components.make_law(built, method_of("a"), "augmented")
     if law_of == "no-standing":
         law = replace(law, avoidance=replace(law.avoidance, stands=False))
     presets = components.make_presets(scenario)
@@ -156,13 +153,6 @@ def driven(draw: Draw, law_of: str) -> Array:
             velocity = law.velocity(errors.published(t, places), near, target, rate, [None] * ROBOTS)
         places[:ROBOTS] += PERIOD_S * np.asarray(velocity)
     return np.array([*ways, places[:ROBOTS, :2]])
-
-
-def components_method() -> Any:
-    """Method (a): the law alone."""
-    from airground_drake.base.registry import METHODS
-
-    return METHODS["a"]
 
 
 def _sensing_of(law_of: str, sensing: Sensing) -> Sensing | None:
@@ -209,8 +199,7 @@ def main() -> int:
     parser.add_argument("-o", "--output", help="file for a line of JSON per draw")
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.n)
-    pieces = [partial(several, given.law, given.full, given.gain, [*seeds[k :: given.jobs]]) for k in range(given.jobs)]
-    rows = [row for part in run_parallel(pieces, jobs=given.jobs) for row in part]
+    rows = run_parallel([partial(one, given.law, given.full, given.gain, seed) for seed in seeds], jobs=given.jobs)
     if given.output:
         with open(given.output, "w", encoding="utf-8") as file:
             file.writelines(json.dumps(row) + "\n" for row in rows)
@@ -226,11 +215,6 @@ def main() -> int:
             print(f"  {claim}: holds in {sum(row[claim] == 'holds' for row in rows)} of {len(rows)}")
         print(f"  arrived: {sum(row['arrived'] for row in rows)} of {ROBOTS * len(rows)}")
     return int(given.law in ("enlarged", "own-views") and bool(broken))
-
-
-def several(law_of: str, full: bool, gain_share: float, seeds: list[int]) -> list[dict[str, Any]]:
-    """The rows of some draws."""
-    return [one(law_of, full, gain_share, seed) for seed in seeds]
 
 
 if __name__ == "__main__":
