@@ -1,13 +1,13 @@
 """Users' plants: Drake Systems with a declared drift and cover, which each run measures."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from builders.edits import with_cells
 from pydrake.systems.framework import BasicVector, Diagram, DiagramBuilder, LeafSystem, System
 from pydrake.systems.primitives import LinearSystem
 from sim.blocks.both_programs import checked, found
@@ -244,9 +244,8 @@ def test_the_checker_comes_to_the_same_verdicts() -> None:
 )
 def test_a_forged_record_is_found(table: str, column: str) -> None:
     trace = of(Lagging, drift_m_s=1e-5, cover_m=LAG_S * 6.0)
-    rows = getattr(trace, table).copy()
-    rows.loc[rows.index[60], f"ugv1.{column}"] += 1.0 if table == "states" else -1e-6
-    forged = replace(trace, **{table: rows})
+    by = 1.0 if table == "states" else -1e-6
+    forged = with_cells(trace, table, 60, f"ugv1.{column}", lambda value: value + by)
     assert found(forged, "SAFE-TRACE") == {"SAFE-TRACE": "error"}
     with pytest.raises(Disagreement, match=r"(drift|cover) of a plant"):
         _moves_as_commanded(checked(forged), "ugv1")

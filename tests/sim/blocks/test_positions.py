@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.edits import with_cells
 from oracles import ORACLES, faults_of
 from sim.blocks.both_programs import broken_rules, checked, found
 
@@ -140,15 +141,9 @@ def test_measured_positions_are_announced_too() -> None:
     assert not faults_of(trace)
 
 
-def forged(trace: Trace, column: str, value: Any, sample: int) -> Trace:
-    samples = trace.samples.copy()
-    samples.loc[sample, column] = value
-    return replace(trace, samples=samples)
-
-
 def test_positions_elsewhere_than_announced_are_found() -> None:
     trace = run(0, 0.0, PERIOD_S, "d")
-    moved = forged(trace, "ugv1.seen_x_m", trace.as_seen("ugv1", "ugv1")[40, 0] + 1e-6, 40)
+    moved = with_cells(trace, "samples", 40, "ugv1.seen_x_m", lambda seen: seen + 1e-6)
     assert broken_rules(moved) == 2 * ["announced position"]
 
 
@@ -160,7 +155,7 @@ def test_a_ugv_that_drives_without_a_message_of_a_near_one_is_found() -> None:
         for k in np.flatnonzero(np.linalg.norm(trace.chosen(first), axis=1) > 0.1).tolist()
         if np.linalg.norm((trace.position(first) - trace.position(second))[trace.sample_rows[k]]) < APART_M + 0.1
     )
-    unheard = forged(trace, f"{first}.heard_{second}_s", trace.sampled("t_s")[k - 1], k)
+    unheard = with_cells(trace, "samples", k, f"{first}.heard_{second}_s", trace.sampled("t_s")[k - 1])
     assert broken_rules(unheard) == 2 * ["standing without a message"]
     assert ORACLES["records"](unheard)
 
