@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from builders.problems import random_problem
-from pydrake.common import RandomGenerator
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from sim.blocks.contexts import begun
 from ugv.oracles import Enumeration
 
 from airground_drake.base.errors import PluginError, SimulationError
@@ -186,10 +186,7 @@ def test_gains_changed_in_a_context_count_in_the_prediction(run: str) -> None:
     for changed in (True, False):
         scenario = load("case_b", () if changed else [f"control.{name}={value}" for name, value in gains.items()])
         model = build_model(scenario, scenario.runs[run].method, disturbed=False)
-        simulator = Simulator(model.diagram)
-        context = simulator.get_mutable_context()
-        context.SetAccuracy(1e-6)
-        model.diagram.SetRandomContext(context, RandomGenerator(1))
+        simulator = Simulator(model.diagram, context := begun(model.diagram, 1))
         for controller in model.controllers if changed else ():
             view = controller.mutable_gains(controller.GetMyMutableContextFromRoot(context))
             for name in set(gains) & set(view.get_fields()):
