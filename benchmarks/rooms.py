@@ -14,6 +14,7 @@ from functools import partial
 from statistics import median
 from typing import Any, NamedTuple
 
+import maps
 import numpy as np
 import orca
 
@@ -80,13 +81,11 @@ def drawn(seed: int, robots: str) -> Scenario:
                 places.append(place.round(3))
     for k in range(4):
         side = -1 if k < 2 else 1
-        start, target = ends[side][k % 2].tolist(), ends[-side][2 + k % 2].tolist()
-        data["ugvs"][f"robot{k}"] = {
-            "start_m": [*start, 0.0], "target_m": [*target, 0.0], "max_speed_m_s": MOST_M_S, "radius_m": RADIUS_M,
-            "preset": {"waypoints_m": [[*start, 0.0], [*target, 0.0]], "speed_m_s": PRESET_M_S},
-        }  # fmt: skip
+        start, target = ends[side][k % 2], ends[-side][2 + k % 2]
+        robot = maps.straight(start, target, PRESET_M_S, max_speed_m_s=MOST_M_S, radius_m=RADIUS_M)
+        data["ugvs"][f"robot{k}"] = robot
         if robots == "burgers":
-            data["ugvs"][f"robot{k}"]["plant"] = BURGER | {"heading_rad": 0.0 if side < 0 else np.pi}
+            robot["plant"] = BURGER | {"heading_rad": 0.0 if side < 0 else np.pi}
     return from_data(data, f"rooms of seed {seed}")
 
 

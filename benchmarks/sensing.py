@@ -22,6 +22,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
+import maps
 import numpy as np
 
 from airground_drake.base.arrays import Array
@@ -70,20 +71,15 @@ def drawn(seed: int, gain_share: float = 1.0, *, own_views: bool = False) -> Dra
         if all(_is_free(places, discs, room_m) for places in (start, goal)):
             break
 
-    def point(place: Array) -> list[float]:
-        return [*place.round(4).tolist(), 0.0]
-
+    discs[:, :2] = discs[:, :2].round(4)
     ugvs = {
-        f"ugv{i}": {
-            "start_m": point(start[i]), "target_m": point(goal[i]), "max_speed_m_s": speed,
-            "preset": {"waypoints_m": [point(start[i]), point(goal[i])], "speed_m_s": 0.6 * speed},
-        }
+        f"ugv{i}": maps.straight(start[i].round(4), goal[i].round(4), 0.6 * speed, max_speed_m_s=speed)
         for i in range(ROBOTS)
-    }  # fmt: skip
+    }
     data = {
         "name": f"drawn_{seed}", "duration_s": LASTS_S, "arrival_tolerance_m": 0.3, "ugvs": ugvs,
         "uav": {"start_m": [0.0, 0.0, 4.0], "altitude_m": 4.0},
-        "obstacles": {f"disc{k}": {"position_m": point(disc[:2]), "radius_m": disc[2]} for k, disc in enumerate(discs)},
+        "obstacles": {f"disc{k}": {"position_m": [x, y], "radius_m": r} for k, (x, y, r) in enumerate(discs.tolist())},
         "safe_distance": {"obstacle_m": distance, "ugv_m": distance, "air_ground_m": 1.0},
         "control": {
             "period_s": PERIOD_S, "avoidance_gain_1_s": max(share, least) / PERIOD_S, "formation_gain_1_s": 5.0,
@@ -96,7 +92,6 @@ def drawn(seed: int, gain_share: float = 1.0, *, own_views: bool = False) -> Dra
     }  # fmt: skip
     scenario = from_data(data, f"draw {seed}")
     scenario.control.avoidance_gain_1_s = share / PERIOD_S
-    discs[:, :2] = discs[:, :2].round(4)
     return Draw(scenario, discs, distance, error)
 
 

@@ -5,6 +5,7 @@ from functools import cache
 from itertools import permutations
 from typing import Any
 
+import maps
 import numpy as np
 import pytest
 from builders.edits import with_cells
@@ -31,16 +32,13 @@ ABOUT_D = ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP", "GATE-PLAN", "THR-TRIG")
 def team(seed: int, links: dict[str, float] | None, plant: Any = None, **more: Any) -> Scenario:
     draw = np.random.default_rng(seed)
     angles = 0.5 * np.pi * np.arange(4) + draw.uniform(-0.5, 0.5, 4)
-    starts = np.round(4.0 * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles]), 3)
-    ends = np.round(-starts + np.append(draw.uniform(-0.6, 0.6, (4, 2)), np.zeros((4, 1)), axis=1), 3)
+    starts = np.round(4.0 * np.column_stack([np.cos(angles), np.sin(angles)]), 3)
+    ends = np.round(-starts + draw.uniform(-0.6, 0.6, (4, 2)), 3)
     speeds = draw.uniform(0.8, 2.0, 4).round(2)
     ugvs = {
-        f"ugv{k + 1}": {
-            "start_m": start, "target_m": end, "max_speed_m_s": speed, **({"plant": plant} if plant else {}),
-            "preset": {"waypoints_m": [start, end], "speed_m_s": 0.7 * speed},
-        }
-        for k, (start, end, speed) in enumerate(zip(starts.tolist(), ends.tolist(), speeds.tolist(), strict=True))
-    }  # fmt: skip
+        f"ugv{k}": maps.straight(*way, 0.7 * speed, max_speed_m_s=speed, **({"plant": plant} if plant else {}))
+        for k, (*way, speed) in enumerate(zip(starts, ends, speeds.tolist(), strict=True), start=1)
+    }
     rock = [*np.round(draw.uniform(-0.5, 0.5, 2), 3).tolist(), 0.0]
     data = {
         "name": "circle", "duration_s": 8.0, "ugvs": ugvs, "uav": {"start_m": [0.0, 0.0, 3.0], "altitude_m": 3.0},

@@ -4,6 +4,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
+import maps
 import numpy as np
 import pytest
 from builders.edits import with_cells
@@ -38,12 +39,12 @@ PERSON = {"radius_m": 0.25, "max_speed_m_s": 1.0, "moves": {
 
 
 def crossing(others: Any = (), **sensing: Any) -> Scenario:
-    def ugv(start: list[float], target: list[float]) -> dict[str, Any]:
-        return {"start_m": start, "target_m": target, "preset": {"waypoints_m": [start, target]}, "max_speed_m_s": 2.0}
-
     data = {
         "name": "crossing_of_two", "duration_s": 12.0,
-        "ugvs": {"ugv1": ugv([-5.0, 0.0, 0.0], [5.0, 0.0, 0.0]), "ugv2": ugv([0.0, -5.0, 0.0], [0.0, 5.0, 0.0])},
+        "ugvs": {
+            "ugv1": maps.straight((-5.0, 0.0), (5.0, 0.0), 1.0, max_speed_m_s=2.0),
+            "ugv2": maps.straight((0.0, -5.0), (0.0, 5.0), 1.0, max_speed_m_s=2.0),
+        },
         "uav": {"start_m": [-2.5, -2.5, 2.0]},
         "obstacles": {"rock": {"position_m": [2.5, 0.3, 0.0], "radius_m": 0.3}, **dict(others)},
         "safe_distance": {"obstacle_m": 0.6, "ugv_m": 0.6},

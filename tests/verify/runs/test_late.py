@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import maps
 import numpy as np
 import pytest
 from builders.edits import with_cells
@@ -23,11 +24,8 @@ PERSON = {"radius_m": 0.05, "moves": {"waypoints_m": [[1.2, -3.0], [1.2, 0.0]], 
 
 
 def beside(obstacle: dict[str, Any], plant: Any, *, speed: float = 2.0, radius: float = 0.1, **safe: float) -> Trace:
-    start, target = [0.0, 0.0, 0.0], [8.0, 0.0, 0.0]
-    ugv = {
-        "start_m": start, "target_m": target, "preset": {"waypoints_m": [start, target], "speed_m_s": speed},
-        "max_speed_m_s": speed if speed < 1.0 else 2.5, "radius_m": radius, "plant": plant,
-    }  # fmt: skip
+    limit = speed if speed < 1.0 else 2.5
+    ugv = maps.straight((0.0, 0.0), (8.0, 0.0), speed, max_speed_m_s=limit, radius_m=radius, plant=plant)
     data = {
         "name": "late", "duration_s": 6.0, "ugvs": {"u1": ugv}, "obstacles": {"rock": obstacle},
         "uav": {"start_m": [0.0, 20.0, 4.0], "target_m": [8.0, 20.0, 4.0], "altitude_m": 4.0},
