@@ -1,7 +1,6 @@
 """The oracle of decisions: silent on honest runs, and not on records that a faulty gatekeeper would leave."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
