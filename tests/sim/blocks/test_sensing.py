@@ -193,20 +193,17 @@ def test_without_the_key_nothing_is_written_of_it_and_the_loop_makes_the_run() -
         make_monitor(measured)
 
 
-def test_a_robot_stands_where_inequalities_contradict_one_another() -> None:
-    normal, bound = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), np.array([0.1, 0.1])
-    wish = np.array([0.5, 0.5, 0.0])
-    assert not kernels.avoid_one(wish, normal, bound, kernels.STANDING, np.inf).any()
-    assert kernels.avoid_one(wish, normal, bound - 0.2, kernels.STANDING, np.inf).tolist() == pytest.approx(
-        [0.1, 0.5, 0.0]
-    )
-
-
-def test_a_robot_stands_where_inequalities_ask_for_more_than_its_speed_limit() -> None:
-    normal, bound = np.array([[1.0, 0.1, 0.0], [-1.0, 0.1, 0.0]]), np.array([0.1, 0.1])  # both: 1 m/s along y
-    wish = np.array([0.5, 0.5, 0.0])
-    assert kernels.avoid_one(wish, normal, bound, kernels.STANDING, 1.1)[1] == pytest.approx(1.0)
-    assert not kernels.avoid_one(wish, normal, bound, kernels.STANDING, 0.9).any()
+@pytest.mark.parametrize(
+    ("y", "bound", "limit", "velocity"),
+    [(0.0, -0.1, np.inf, [0.1, 0.5]), (0.0, 0.1, np.inf, []), (0.1, 0.1, 1.1, [0.0, 1.0]), (0.1, 0.1, 0.9, [])],
+)
+def test_a_robot_stands_where_inequalities_contradict_each_other_or_ask_for_more_than_its_speed_limit(
+    y: float, bound: float, limit: float, velocity: list[float]
+) -> None:
+    """Both ask for 0.1 m/s to opposite sides, which y = 0.1 allows from 1 m/s along y on; [] stands for standing."""
+    wish, normal = np.array([0.5, 0.5, 0.0]), np.array([[1.0, y, 0.0], [-1.0, y, 0.0]])
+    found = kernels.avoid_one(wish, normal, np.full(2, bound), kernels.STANDING, limit)
+    assert found[:2].tolist() == pytest.approx(velocity) if velocity else not found.any()
 
 
 def any_bounds() -> st.SearchStrategy[Bounds]:
