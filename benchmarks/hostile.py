@@ -31,6 +31,7 @@ from hostile_uav import CHOICES, LyingPlanner, Tactic, drawn, mutated, shape_at
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.registry import Method
+from airground_drake.model.bodies.motion import PeriodMotion
 from airground_drake.model.bodies.world import Body
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.motion import Motion
@@ -175,10 +176,8 @@ def executed(
 
 def own_margin(way: Array, walked: Array, person: Person, period: float) -> float:
     """How near the UGV came to where the person was at each sample, less min(D, d + V h), m."""
-    start, step = (way - walked)[:-1], np.diff(way, axis=0)
-    squared = np.maximum((step * step).sum(axis=1), 1e-300)
-    share = np.clip(-(start * step).sum(axis=1) / squared, 0.0, 1.0)
-    least = np.linalg.norm(start + share[:, None] * step, axis=1)
+    start = (way - walked)[:-1]
+    least = PeriodMotion(start, start + np.diff(way, axis=0)).least_distance()[0]
     keeps = person.keeps_m + person.speed_m_s * period
     return float((least - np.minimum(np.linalg.norm(start, axis=1), keeps)).min())
 

@@ -3,6 +3,7 @@
 A course is drawn from its seed, the number of UGVs and the density alone, so that every method gets the same one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Place = Sequence[float] | Array
 
 COURSE_M = 20.0
 """Distance between the two strips in which UGVs start and end, m."""
@@ -126,6 +128,12 @@ def _apart(rng: np.random.Generator, strip: Array, width: float) -> Array:
             return places
 
 
+def straight(start: Place, target: Place, speed_m_s: float, **more: Any) -> dict[str, Any]:
+    """A UGV of a scenario, on the ground, whose preset leads straight to its target."""
+    ends = [[float(x), float(y), 0.0] for x, y, *_ in (start, target)]
+    return {"start_m": ends[0], "target_m": ends[1], "preset": {"waypoints_m": ends, "speed_m_s": speed_m_s}, **more}
+
+
 def scenario_of(course: Course, policies: list[dict[str, Any]]) -> dict[str, Any]:
     """The scenario of a course, as in a file, with a run for each method.
 
@@ -133,22 +141,13 @@ def scenario_of(course: Course, policies: list[dict[str, Any]]) -> dict[str, Any
         course: which.
         policies: entry `intervention.policies`.
     """
-    ugvs = {}
-    for i in range(course.ugvs):
-        start, target = _on_ground(course.starts[i]), _on_ground(course.targets[i])
-        ugvs[f"ugv{i + 1}"] = {
-            "start_m": start,
-            "target_m": target,
-            "preset": {"waypoints_m": [start, target], "speed_m_s": PRESET_M_S},
-            "max_speed_m_s": MAX_M_S,
-        }
-    height = 3.0
+    ways, height = zip(map(_on_ground, course.starts), map(_on_ground, course.targets), strict=True), 3.0
     return {
         "name": course.name,
         "title": f"Random course {course.seed}: {course.ugvs} UGVs, {len(course.obstacles)} obstacles",
         "seed": course.seed,
         "duration_s": course.duration_s,
-        "ugvs": ugvs,
+        "ugvs": {f"ugv{i}": straight(*way, PRESET_M_S, max_speed_m_s=MAX_M_S) for i, way in enumerate(ways, start=1)},
         "uav": {
             "start_m": [*course.starts.mean(axis=0).tolist(), height],
             "target_m": [*course.targets.mean(axis=0).tolist(), height],
@@ -170,6 +169,6 @@ def scenario_of(course: Course, policies: list[dict[str, Any]]) -> dict[str, Any
     }
 
 
-def _on_ground(place: Array) -> list[float]:
+def _on_ground(place: Place) -> list[float]:
     """A place in the plane as a point of a scenario, m; to a micrometre, so that files are readable."""
     return [round(float(place[0]), 6), round(float(place[1]), 6), 0.0]

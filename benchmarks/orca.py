@@ -12,6 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from maps import MAX_M_S, PRESET_M_S, SAFE_M, Array, Course
 
+from airground_drake.model.geometry.motion import Motion
+from airground_drake.scenario.schema import Scenario
+
 STEP_S = 0.05
 MOTION_GAIN_1_S = 2.0
 """Control period, s, and gain, 1/s, of the UGVs' own task: those of the scenarios."""
@@ -49,6 +52,23 @@ class Traffic(NamedTuple):
     people: Array
     of_people: float
     seed: int
+
+
+def presets_of(scenario: Scenario) -> Callable[[int, float], tuple[Array, Array]]:
+    """The preset trajectories of its UGVs, as of `Traffic`."""
+    given = [ugv.preset for ugv in scenario.ugvs.values()]
+    presets = [Motion.at_speed(np.array(preset.waypoints_m), preset.speed_m_s) for preset in given]
+
+    def preset(i: int, t: float) -> tuple[Array, Array]:
+        place, rate = presets[i].at(t)
+        return place[:2], rate[:2]
+
+    return preset
+
+
+def box(low: Array, high: Array) -> Array:
+    """Corners, counter-clockwise, of a rectangle between two of them, (4, 2), m."""
+    return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
 
 
 def run(course: Course) -> tuple[Array, Array]:

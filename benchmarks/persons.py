@@ -22,7 +22,6 @@ import orca
 from airground_drake.base.arrays import Array
 from airground_drake.base.parallel import run_parallel
 from airground_drake.model.bodies.motion import PeriodMotion
-from airground_drake.model.geometry.motion import Motion
 from airground_drake.scenario.courses import course
 from airground_drake.scenario.load import load, validated
 from airground_drake.scenario.schema import Moves, Obstacle, Scenario
@@ -122,21 +121,12 @@ def judged(trace: Trace) -> Counter[str]:
 def by_orca(scenario: Scenario, _: str) -> Judged:
     """The same robots and people, by ORCA."""
     ugvs, half = list(scenario.ugvs.values()), 0.5 * scenario.safe_distance.moving_m
-    presets = [Motion.at_speed(np.array(ugv.preset.waypoints_m), ugv.preset.speed_m_s) for ugv in ugvs]
-
-    def preset(i: int, t: float) -> tuple[Array, Array]:
-        place, rate = presets[i].at(t)
-        return place[:2], rate[:2]
-
-    x, y = (0.5 * side + half for side in scenario.obstacles["pillar"].size_m)
-    pillar = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
-    (left, bottom), (right, top) = scenario.arena_m[0], scenario.arena_m[1]
-    ends = left + half, right - half, bottom + half, top - half
-    hall = np.array([[ends[0], ends[2]], [ends[0], ends[3]], [ends[1], ends[3]], [ends[1], ends[2]]])
+    corner, (low, high) = 0.5 * np.array(scenario.obstacles["pillar"].size_m) + half, np.array(scenario.arena_m)
+    pillar, hall = orca.box(-corner, corner), orca.box(low + half, high - half)[::-1]
     steps = orca.STEP_S * np.arange(round(scenario.duration_s / orca.STEP_S) + 1)
     traffic = orca.Traffic(
-        np.array([ugv.start_m[:2] for ugv in ugvs]), ugvs[0].radius_m + half, ugvs[0].max_speed_m_s, preset,
-        [pillar, hall], walks(scenario, steps)[..., :2], BODY_M + half, scenario.seed,
+        np.array([ugv.start_m[:2] for ugv in ugvs]), ugvs[0].radius_m + half, ugvs[0].max_speed_m_s,
+        orca.presets_of(scenario), [pillar, hall], walks(scenario, steps)[..., :2], BODY_M + half, scenario.seed,
     )  # fmt: skip
     tracks = Tracks(*orca.driven(traffic, scenario.duration_s))
     return tracks, lambda: Counter({"SAFE-OWN": int(own_margin(scenario, tracks) >= -1e-9)})
@@ -182,9 +172,7 @@ def main() -> None:
         total = sum(run_parallel(work, names=[f"seed {seed}" for seed in seeds], jobs=given.jobs), Counter[str]())
         claims = CLAIMS if way != "orca" else ("SAFE-OWN",)
         told = ", ".join(f"{claim} in {total[claim]}" for claim in claims)
-        ends = ", ".join(
-            f"{total[f'robots {what}']} {what}" for what in ("run into", "nearer than required", "arrived")
-        )
+        ends = ", ".join(f"{total[f'robots {what}']} {what}" for what in ENDS)
         print(f"({way}) {given.n} runs, {3 * given.n} robots: {told}; {ends}", flush=True)
 
 

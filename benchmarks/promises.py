@@ -20,6 +20,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import maps
 import numpy as np
 import numpy.typing as npt
 
@@ -56,12 +57,9 @@ def draw(number: int) -> dict[str, Any]:
     period_s, speed = float(rng.choice([0.025, 0.05])), float(rng.choice([0.5, 1.0, 2.0]))
     ugvs = {}
     for k in range(int(rng.integers(1, 3))):
-        start, target = [0.0, 6.0 * k, 0.0], [8.0, 6.0 * k + float(rng.uniform(-1.0, 1.0)), 0.0]
-        ugvs[f"u{k}"] = {
-            "start_m": start, "target_m": target, "radius_m": 0.1, "max_speed_m_s": 1.25 * speed,
-            "preset": {"waypoints_m": [start, target], "speed_m_s": speed},
-            "plant": PLANTS[int(rng.integers(len(PLANTS)))],
-        }  # fmt: skip
+        start, target = (0.0, 6.0 * k), (8.0, 6.0 * k + float(rng.uniform(-1.0, 1.0)))
+        of = {"radius_m": 0.1, "max_speed_m_s": 1.25 * speed, "plant": PLANTS[int(rng.integers(len(PLANTS)))]}
+        ugvs[f"u{k}"] = maps.straight(start, target, speed, **of)
     obstacles = {f"o{k}": _obstacle(rng, speed, len(ugvs)) for k in range(int(rng.integers(1, 5)))}
     return {
         "name": f"promises_{number}", "duration_s": 6.0, "ugvs": ugvs, "obstacles": obstacles,

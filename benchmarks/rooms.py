@@ -14,12 +14,12 @@ from functools import partial
 from statistics import median
 from typing import Any, NamedTuple
 
+import maps
 import numpy as np
 import orca
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.parallel import run_parallel
-from airground_drake.model.geometry.motion import Motion
 from airground_drake.report.metrics import outcome
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.schema import Scenario
@@ -81,13 +81,11 @@ def drawn(seed: int, robots: str) -> Scenario:
                 places.append(place.round(3))
     for k in range(4):
         side = -1 if k < 2 else 1
-        start, target = ends[side][k % 2].tolist(), ends[-side][2 + k % 2].tolist()
-        data["ugvs"][f"robot{k}"] = {
-            "start_m": [*start, 0.0], "target_m": [*target, 0.0], "max_speed_m_s": MOST_M_S, "radius_m": RADIUS_M,
-            "preset": {"waypoints_m": [[*start, 0.0], [*target, 0.0]], "speed_m_s": PRESET_M_S},
-        }  # fmt: skip
+        start, target = ends[side][k % 2], ends[-side][2 + k % 2]
+        robot = maps.straight(start, target, PRESET_M_S, max_speed_m_s=MOST_M_S, radius_m=RADIUS_M)
+        data["ugvs"][f"robot{k}"] = robot
         if robots == "burgers":
-            data["ugvs"][f"robot{k}"]["plant"] = BURGER | {"heading_rad": 0.0 if side < 0 else np.pi}
+            robot["plant"] = BURGER | {"heading_rad": 0.0 if side < 0 else np.pi}
     return from_data(data, f"rooms of seed {seed}")
 
 
@@ -105,19 +103,11 @@ def run(seed: int, robots: str, way: str) -> Run:
 def by_orca(scenario: Scenario, radius: float, around: list[Array]) -> Run:
     """The same by ORCA, for discs of this radius."""
     ugvs, half = list(scenario.ugvs.values()), 0.5 * SAFE_M
-    presets = [Motion.at_speed(np.array(ugv.preset.waypoints_m), ugv.preset.speed_m_s) for ugv in ugvs]
-
-    def preset(i: int, t: float) -> tuple[Array, Array]:
-        place, rate = presets[i].at(t)
-        return place[:2], rate[:2]
-
-    def corners(low: Array, high: Array) -> Array:
-        return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
-
-    hall = corners(half - np.array(HALF_M), np.array(HALF_M) - half)[::-1]
+    hall = orca.box(half - np.array(HALF_M), np.array(HALF_M) - half)[::-1]
     starts, targets = (np.array([getattr(ugv, name)[:2] for ugv in ugvs]) for name in ("start_m", "target_m"))
     traffic = orca.Traffic(
-        starts, radius + half, MOST_M_S, preset, [hall, *(corners(low - half, high + half) for low, high in around)],
+        starts, radius + half, MOST_M_S, orca.presets_of(scenario),
+        [hall, *(orca.box(low - half, high + half) for low, high in around)],
         np.empty((0, 1, 2)), 0.0, scenario.seed,
     )  # fmt: skip
     t, places = orca.driven(traffic, DURATION_S)

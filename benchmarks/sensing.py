@@ -22,10 +22,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
+import maps
 import numpy as np
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.parallel import run_parallel
+from airground_drake.base.registry import method_of
 from airground_drake.model.plants.budget import Bounds, law_distance, least_gain
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.schema import Scenario, Sensing
@@ -69,20 +71,15 @@ def drawn(seed: int, gain_share: float = 1.0, *, own_views: bool = False) -> Dra
         if all(_is_free(places, discs, room_m) for places in (start, goal)):
             break
 
-    def point(place: Array) -> list[float]:
-        return [*place.round(4).tolist(), 0.0]
-
+    discs[:, :2] = discs[:, :2].round(4)
     ugvs = {
-        f"ugv{i}": {
-            "start_m": point(start[i]), "target_m": point(goal[i]), "max_speed_m_s": speed,
-            "preset": {"waypoints_m": [point(start[i]), point(goal[i])], "speed_m_s": 0.6 * speed},
-        }
+        f"ugv{i}": maps.straight(start[i].round(4), goal[i].round(4), 0.6 * speed, max_speed_m_s=speed)
         for i in range(ROBOTS)
-    }  # fmt: skip
+    }
     data = {
         "name": f"drawn_{seed}", "duration_s": LASTS_S, "arrival_tolerance_m": 0.3, "ugvs": ugvs,
         "uav": {"start_m": [0.0, 0.0, 4.0], "altitude_m": 4.0},
-        "obstacles": {f"disc{k}": {"position_m": point(disc[:2]), "radius_m": disc[2]} for k, disc in enumerate(discs)},
+        "obstacles": {f"disc{k}": {"position_m": [x, y], "radius_m": r} for k, (x, y, r) in enumerate(discs.tolist())},
         "safe_distance": {"obstacle_m": distance, "ugv_m": distance, "air_ground_m": 1.0},
         "control": {
             "period_s": PERIOD_S, "avoidance_gain_1_s": max(share, least) / PERIOD_S, "formation_gain_1_s": 5.0,
@@ -95,7 +92,6 @@ def drawn(seed: int, gain_share: float = 1.0, *, own_views: bool = False) -> Dra
     }  # fmt: skip
     scenario = from_data(data, f"draw {seed}")
     scenario.control.avoidance_gain_1_s = share / PERIOD_S
-    discs[:, :2] = discs[:, :2].round(4)
     return Draw(scenario, discs, distance, error)
 
 
@@ -106,9 +102,8 @@ def _is_free(places: Array, discs: Array, room_m: float) -> bool:
     return bool(between.min() > room_m and beside.min() > room_m)
 
 
-def least_apart(way: Array, other: Array) -> float:
-    """The least distance of two points on straight ways between the same instants, (T, 2), m."""
-    apart = way - other
+def least_apart(apart: Array) -> float:
+    """The least distance of two points that are apart by (T, 2), m, and go straight between the instants."""
     start, change = apart[:-1], np.diff(apart, axis=0)
     squared = np.einsum("ij,ij->i", change, change)
     along = -np.einsum("ij,ij->i", start, change)
@@ -119,11 +114,8 @@ def least_apart(way: Array, other: Array) -> float:
 def shortest(ways: Array, discs: Array) -> tuple[float, float]:
     """The least distances between UGVs, and from the edges of discs, m; ways (T, n, 2)."""
     count = ways.shape[1]
-    pairs = min(least_apart(ways[:, i], ways[:, j]) for i in range(count) for j in range(i))
-    beside = min(
-        least_apart(ways[:, i], np.broadcast_to(disc[:2], ways[:, i].shape)) - disc[2]
-        for i in range(count) for disc in discs
-    )  # fmt: skip
+    pairs = min(least_apart(ways[:, i] - ways[:, j]) for i in range(count) for j in range(i))
+    beside = min(least_apart(ways[:, i] - disc[:2]) - disc[2] for i in range(count) for disc in discs)
     return pairs, beside
 
 
@@ -139,7 +131,7 @@ def driven(draw: Draw, law_of: str) -> Array:
     if law_of == "one-error":  # beside another robot
         pair = law_distance(draw.promised_m, Bounds(error_m=draw.error_m), gain=1.0)
         near = near._replace(distance=np.where(near.share < 1.0, np.minimum(near.distance, pair), near.distance))
-    law = components.make_law(built, components_method(), "augmented")
+    law = components.make_law(built, method_of("a"), "augmented")
     if law_of == "no-standing":
         law = replace(law, avoidance=replace(law.avoidance, stands=False))
     presets = components.make_presets(scenario)
@@ -156,13 +148,6 @@ def driven(draw: Draw, law_of: str) -> Array:
             velocity = law.velocity(errors.published(t, places), near, target, rate, [None] * ROBOTS)
         places[:ROBOTS] += PERIOD_S * np.asarray(velocity)
     return np.array([*ways, places[:ROBOTS, :2]])
-
-
-def components_method() -> Any:
-    """Method (a): the law alone."""
-    from airground_drake.base.registry import METHODS
-
-    return METHODS["a"]
 
 
 def _sensing_of(law_of: str, sensing: Sensing) -> Sensing | None:
@@ -209,8 +194,7 @@ def main() -> int:
     parser.add_argument("-o", "--output", help="file for a line of JSON per draw")
     given = parser.parse_args()
     seeds = range(given.first, given.first + given.n)
-    pieces = [partial(several, given.law, given.full, given.gain, [*seeds[k :: given.jobs]]) for k in range(given.jobs)]
-    rows = [row for part in run_parallel(pieces, jobs=given.jobs) for row in part]
+    rows = run_parallel([partial(one, given.law, given.full, given.gain, seed) for seed in seeds], jobs=given.jobs)
     if given.output:
         with open(given.output, "w", encoding="utf-8") as file:
             file.writelines(json.dumps(row) + "\n" for row in rows)
@@ -226,11 +210,6 @@ def main() -> int:
             print(f"  {claim}: holds in {sum(row[claim] == 'holds' for row in rows)} of {len(rows)}")
         print(f"  arrived: {sum(row['arrived'] for row in rows)} of {ROBOTS * len(rows)}")
     return int(given.law in ("enlarged", "own-views") and bool(broken))
-
-
-def several(law_of: str, full: bool, gain_share: float, seeds: list[int]) -> list[dict[str, Any]]:
-    """The rows of some draws."""
-    return [one(law_of, full, gain_share, seed) for seed in seeds]
 
 
 if __name__ == "__main__":

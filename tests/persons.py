@@ -3,6 +3,8 @@
 from functools import cache
 from typing import Any
 
+import maps
+
 import airground_drake as ag
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.schema import Scenario
@@ -19,8 +21,6 @@ def walking(*way: list[float], speed: float = 1.2, **more: Any) -> dict[str, Any
 def lone(
     name: str, start: float, target: float, *, speed: float = 0.6, duration: float = 12.0, **more: Any
 ) -> Scenario:
-    begin, end = [start, 0.0, 0.0], [target, 0.0, 0.0]
-    ugv = {"start_m": begin, "target_m": end, "preset": {"waypoints_m": [begin, end], "speed_m_s": speed}}
     data = {
         "name": name,
         "duration_s": duration,
@@ -28,7 +28,7 @@ def lone(
         "safe_distance": {"obstacle_m": D, "ugv_m": D, "air_ground_m": 1.0},
         "control": {"period_s": H, "sensing_range_m": 4.0},
         "intervention": {"policies": [{"name": "coordinate"}]},
-        "ugvs": {"ugv1": {**ugv, "max_speed_m_s": 1.0, "radius_m": 0.2}},
+        "ugvs": {"ugv1": maps.straight((start, 0.0), (target, 0.0), speed, max_speed_m_s=1.0, radius_m=0.2)},
         "runs": {"a": {"method": "a"}},
     }
     return from_data(data | more, name)

@@ -13,6 +13,7 @@ from builders import logs
 from builders.misbuilt import neighbours
 from oracles import faults_of
 from report.cases import built
+from sim.blocks.both_programs import found as statuses
 
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.outline import GAP
@@ -49,10 +50,6 @@ def scenario(*, points: bool = False) -> Scenario:
         safe.obstacle_m, safe.air_ground_m, safe.ugv_m = 1.25 + OWN + ROCK, 0.75 + OWN + FLIER, 1.75 + OWN
         found.ugvs["ugv1"].radius_m = found.uav.radius_m = found.obstacles["rock"].radius_m = 0.0
     return validated(found)
-
-
-def statuses(trace: Trace) -> dict[str, str]:
-    return {verdict.claim.id: verdict.status for verdict in judge(trace)}
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from airground_drake.base.errors import ScenarioError, one_line
 from airground_drake.base.limits import MAX_NAME, MAX_UGVS
 from airground_drake.base.usage import between, output_file, refuse, whole
 from airground_drake.scenario.options import Parser, option, parser_of
-from airground_drake.scenario.shipped import argument
+from airground_drake.scenario.shipped import argument, scenario_name
 
 if TYPE_CHECKING:
     from airground_drake.scenario.imported import Imported
@@ -90,7 +90,7 @@ def _imported(options: argparse.Namespace) -> Imported:
     from airground_drake.scenario import imported
 
     path, folder = options.file, options.output.parent
-    name = imported.scenario_name(options.output.stem, options.format.replace("-", "_"))
+    name = scenario_name(options.output.stem, options.format.replace("-", "_"))
     speed = options.max_speed_m_s
     if options.format == "mapf":
         cell_m = options.cell_m or CELL_M

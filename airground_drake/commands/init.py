@@ -6,11 +6,11 @@ from pathlib import Path
 
 from airground_drake.base import files
 from airground_drake.base.errors import one_line
-from airground_drake.base.limits import MAX_NAME, MAX_SEED, MAX_UGVS
+from airground_drake.base.limits import MAX_SEED, MAX_UGVS
 from airground_drake.base.usage import output_file, refuse, whole
 from airground_drake.scenario.fleet import fleet
 from airground_drake.scenario.options import Parser, option, parser_of
-from airground_drake.scenario.shipped import argument, json_schema_file, shipped_files
+from airground_drake.scenario.shipped import argument, json_schema_file, scenario_name, shipped_files
 
 MOST_OBSTACLES = 2000 - MAX_UGVS  # with the largest number of UGVs, as many bodies as the checker accepts
 MODEL = "minimal"  # the shipped scenario that is copied by default
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse("--like and --fleet exclude each other")
     path: Path = options.file
     files.try_to_create(path)
-    name = re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", path.stem, flags=re.ASCII))[:MAX_NAME] or MODEL
+    name = scenario_name(path.stem, MODEL)
     if options.fleet is None:
         model = options.like or MODEL
         text = shipped_files()[model].read_text(encoding="utf-8")

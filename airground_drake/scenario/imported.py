@@ -19,6 +19,7 @@ from airground_drake.scenario.maps import gazebo, movingai, sites
 from airground_drake.scenario.maps.rectangles import Cells
 from airground_drake.scenario.rounding import Rounding
 from airground_drake.scenario.schema import Control
+from airground_drake.scenario.shipped import scenario_name
 
 MOST_BYTES = 16_000_000  # most bytes of a world, a map or an imported scenario
 MAX_SPEED_M_S, UAV_MAX_SPEED_M_S = 1.5, 10.0
@@ -275,11 +276,6 @@ def _text(path: Path) -> str:
         return files.read_bytes(path, MOST_BYTES, links=True).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ScenarioError(str(path), "", Fault("not UTF-8 text"), "wanted: a text file") from None
-
-
-def scenario_name(text: str, instead: str) -> str:
-    """A text as a name that a scenario may have: letters, digits and underscores; `instead` if nothing is left."""
-    return re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", text, flags=re.ASCII))[:MAX_NAME] or instead
 
 
 def _new_name(text: str, taken: Collection[str]) -> str:

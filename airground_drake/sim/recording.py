@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,9 +88,9 @@ def trace_of(
         proposals=proposals(ugvs, done.memories.values()),
         plans=plans(done.memories, ugvs),
     )
-    memories = done.memories.values()
-    sent = carried(memories, done.carried, ugvs) if done.carried else messages(memories, trace)
-    trace = replace(trace, messages=sent)
+    memories = [*done.memories.values()]
+    sent = _carried(memories, done.carried, ugvs) if done.carried else _messages(memories, trace)
+    trace = replace(trace, messages=messages(sent))
     trace.derived("scenario", lambda: given)  # it need not be read from the metadata
     if given.ugv_controller is not None:
         for ugv, t_s, number in unheard(trace):
@@ -306,25 +306,24 @@ def _outcome(asking: Asked) -> str:
     return "proposed" if asking.chosen else "passed over" if asking.party else "nothing"
 
 
-def messages(memories: Iterable[PlannerState], trace: Trace) -> pd.DataFrame:
-    """`Trace.messages` of a run without a channel, from the UAVs' memories and the trace's decisions and samples."""
-    rows = sorted(_messages([*memories], trace), key=lambda row: (row["sent_s"], _ORDER.index(row["kind"])))
-    return typed(rows, MESSAGE_COLUMNS)
+def messages(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    kinds = ("answer", "withdrawal", "proposal")  # of one instant, in the order of the table
+    return typed(sorted(rows, key=lambda row: (row["sent_s"], kinds.index(row["kind"]))), MESSAGE_COLUMNS)
 
 
-_ORDER = ("answer", "withdrawal", "proposal")  # kinds of messages of one instant, in the order of the table
+NEVER_S = float("nan")
 
 
 def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[str, Any]]:
-    """Rows of messages; each is delivered when it is sent."""
+    """Rows of a run without a channel, from the UAVs' memories and the trace's decisions and samples."""
     sent = _sent(memories)
     parties = {proposal.number: (proposal.sender, i) for i, proposal in sent}
 
     def row(kind: Kind, number: int, about: int, sent_s: float, read_s: float) -> dict[str, Any]:
         uav, ugv = parties[about]
-        return _row(Message(kind, number, about, ugv, sent_s), 0, sent_s, read_s, uav, trace.ugvs)
+        return _row(Delivery(sent_s, 0, 0, Message(kind, number, about, ugv, sent_s)), read_s, uav, trace.ugvs)
 
-    read, never = dict(read for memory in memories for read in memory.read), float("nan")
+    read = dict(read for memory in memories for read in memory.read)
     latest_first = (trace.decisions[name].tolist()[::-1] for name in ("number", "t_s"))
     decided = dict(zip(*latest_first, strict=True))  # when each was decided on first
     for i, proposal in sent:
@@ -332,49 +331,42 @@ def _messages(memories: Sequence[PlannerState], trace: Trace) -> Iterator[dict[s
         if trace.meta["method"] == "b":  # accepted at once
             executing = trace.sampled(f"{trace.ugvs[i]}.executing") == number
             begun = trace.sampled("t_s")[executing]
-            yield row("proposal", number, number, issued, float(begun[0]) if len(begun) else never)
+            yield row("proposal", number, number, issued, float(begun[0]) if len(begun) else NEVER_S)
         else:
-            yield row("proposal", number, number, issued, decided.get(number, never))
+            yield row("proposal", number, number, issued, decided.get(number, NEVER_S))
     withdrawn = sorted((gone for memory in memories for gone in memory.withdrawn), key=lambda gone: gone[1])
     for count, (number, t) in enumerate(withdrawn):
         yield row("withdrawal", count, number, t, t)
     answers = trace.decisions[trace.decisions["answer"] >= 0]
     for t, answer, number in zip(*(answers[c].tolist() for c in ("t_s", "answer", "number")), strict=True):
-        yield row("answer", answer, number, t, read.get(answer, never))
+        yield row("answer", answer, number, t, read.get(answer, NEVER_S))
 
 
-def carried(
-    memories: Iterable[PlannerState], links: Sequence[tuple[Transit, Sequence[float]]], ugvs: Sequence[str]
-) -> pd.DataFrame:
-    """`Trace.messages` of a run with a channel, from the links' records."""
-    uavs = {proposal.number: proposal.sender for _, proposal in _sent([*memories])}
-    rows = [
-        _row(delivery.message, delivery.copy, received_s, read_s, uavs[delivery.message.about], ugvs)
-        for transit, read in links
-        for delivery, received_s, read_s in _deliveries(transit, read)
-    ]
-    return typed(sorted(rows, key=lambda row: (row["sent_s"], _ORDER.index(row["kind"]))), MESSAGE_COLUMNS)
+def _carried(
+    memories: Sequence[PlannerState], links: Sequence[tuple[Transit, Sequence[float]]], ugvs: Sequence[str]
+) -> Iterator[dict[str, Any]]:
+    """Rows of a run with a channel, from the links' records."""
+    uavs = {proposal.number: proposal.sender for _, proposal in _sent(memories)}
+    for transit, read in links:
+        for delivery, read_s in _deliveries(transit, read):
+            yield _row(delivery, read_s, uavs[delivery.message.about], ugvs)
 
 
-def _deliveries(transit: Transit, read: Sequence[float]) -> Iterator[tuple[Delivery, float, float]]:
-    """Messages that a link delivered or lost, with times of arrival and reading, s."""
-    never = float("nan")
-    unread = (never for _ in transit.arrived)
-    for delivery, read_s in zip(transit.arrived, chain(read, unread), strict=False):
-        yield delivery, delivery.received_s, read_s
-    yield from ((delivery, never, never) for delivery in transit.under_way)
-    yield from ((Delivery(never, -1, 0, message), never, never) for message in transit.lost)
+def _deliveries(transit: Transit, read: Sequence[float]) -> Iterator[tuple[Delivery, float]]:
+    """Messages that a link delivered or lost, with the time of reading, s."""
+    yield from zip(transit.arrived, chain(read, repeat(NEVER_S)), strict=False)
+    yield from ((delivery._replace(received_s=NEVER_S), NEVER_S) for delivery in transit.under_way)
+    yield from ((Delivery(NEVER_S, -1, 0, message), NEVER_S) for message in transit.lost)
 
 
-def _row(
-    message: Message, copy: int, received_s: float, read_s: float, uav: str, ugvs: Sequence[str]
-) -> dict[str, Any]:
+def _row(delivery: Delivery, read_s: float, uav: str, ugvs: Sequence[str]) -> dict[str, Any]:
+    message = delivery.message
     ugv = ugvs[message.ugv]
     sender, receiver = (ugv, uav) if message.kind == "answer" else (uav, ugv)
     return {
-        "kind": message.kind, "number": message.number, "attempt": message.attempt, "copy": copy, "sender": sender,
-        "receiver": receiver, "about": message.about, "sent_s": message.sent_s, "received_s": received_s,
-        "read_s": read_s,
+        "kind": message.kind, "number": message.number, "attempt": message.attempt, "copy": delivery.copy,
+        "sender": sender, "receiver": receiver, "about": message.about, "sent_s": message.sent_s,
+        "received_s": delivery.received_s, "read_s": read_s,
     }  # fmt: skip
 
 

@@ -97,15 +97,15 @@ class Obeying(Immutable):
             if desk.held[i] is not now.desk.held[i]:
                 reports[i] = Report() if desk.held[i] is None else Report(sent)
                 sent += desk.held[i] is not None
-            answers = [number for answer in obeyed(desk.held) for number in answer]
-            desk, sent = replied(desk, {i}, answers, tuple(reports), sent, t, math.inf)
+            desk, sent = replied(desk, {i}, obeyed(desk.held), tuple(reports), sent, t, math.inf)
             now = Obeying(desk, tuple(reports), sent)
         return now
 
 
-def obeyed(held: Proposals) -> list[list[float]]:
-    """The answers of UGVs that accept every held proposal, (n, 2)."""
-    return [[SILENT, -1.0] if proposal is None else [ACCEPT, float(proposal.number)] for proposal in held]
+def obeyed(held: Proposals) -> list[float]:
+    """The answers of UGVs that accept every held proposal, (2n,)."""
+    answers = ((SILENT, -1.0) if proposal is None else (ACCEPT, float(proposal.number)) for proposal in held)
+    return [number for answer in answers for number in answer]
 
 
 def _repeats(last: Message, verdict: float, t: float, retry_s: float) -> bool:

@@ -13,17 +13,22 @@ from airground_drake.sim.trace import Trace
 from builders.layout import decision_table
 from builders.scenarios import changed
 
-
-def with_states(trace: Trace, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
-    states = trace.states.copy()
-    edited = edit(states)
-    return replace(trace, states=states if edited is None else edited)
+TableEdit = Callable[[pd.DataFrame], pd.DataFrame | None]
 
 
-def with_samples(trace: Trace, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
-    samples = trace.samples.copy()
-    edited = edit(samples)
-    return replace(trace, samples=samples if edited is None else edited)
+def with_table(trace: Trace, name: str, edit: TableEdit) -> Trace:
+    table = getattr(trace, name).copy()
+    edited = edit(table)
+    return replace(trace, **{name: table if edited is None else edited})
+
+
+def with_cells(trace: Trace, name: str, rows: Any, columns: Any, value: Any) -> Trace:
+    """A copy with other values in rows and columns of a table; a function is called with what is there."""
+
+    def edit(table: pd.DataFrame) -> None:
+        table.loc[rows, columns] = value(table.loc[rows, columns]) if callable(value) else value
+
+    return with_table(trace, name, edit)
 
 
 def with_meta(trace: Trace, **changes: Any) -> Trace:
@@ -62,29 +67,23 @@ def moved(trace: Trace, robot: str, row: int, offset: list[float]) -> Trace:
             if after > ends[k]:
                 samples.loc[k, f"{robot}.v{axis}_m_s"] -= delta / (t[after] - t[ends[k]])
 
-    return with_samples(with_states(trace, elsewhere), commanded)
+    return with_table(with_table(trace, "states", elsewhere), "samples", commanded)
 
 
 def set_nan(column: str) -> Callable[[Trace], Trace]:
-    def edit(table: pd.DataFrame) -> None:
-        table.loc[300, column] = np.nan
-
-    return lambda trace: _with_column(trace, column, edit)
+    return lambda trace: with_cells(trace, _table_of(trace, column), 300, column, np.nan)
 
 
 def dropped(column: str) -> Callable[[Trace], Trace]:
-    return lambda trace: _with_column(trace, column, lambda table: table.drop(columns=column))
+    return lambda trace: with_table(trace, _table_of(trace, column), lambda table: table.drop(columns=column))
 
 
 def bumped(column: str, by: float, row: int = 500) -> Callable[[Trace], Trace]:
-    def edit(table: pd.DataFrame) -> None:
-        table[column] += by * (table.index == row)
-
-    return lambda trace: _with_column(trace, column, edit)
+    return lambda trace: with_cells(trace, _table_of(trace, column), row, column, lambda value: value + by)
 
 
-def _with_column(trace: Trace, column: str, edit: Callable[[pd.DataFrame], pd.DataFrame | None]) -> Trace:
-    return with_samples(trace, edit) if column in trace.samples else with_states(trace, edit)
+def _table_of(trace: Trace, column: str) -> str:
+    return "samples" if column in trace.samples else "states"
 
 
 def rows(keep: Callable[[pd.DataFrame], pd.DataFrame]) -> Callable[[Trace], Trace]:

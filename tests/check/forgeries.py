@@ -121,22 +121,24 @@ def all_of(*edits: Edit) -> Edit:
 
 
 def leap(robot: str, by_m: float, row: int = ROW, axis: str = "x") -> Edit:
+    """Ahead and back between three rows at control samples; a row below 0 counts from the end."""
+
     def edit(folder: Path) -> None:
         with edited_table(folder) as frame:
             t = frame["t_s"].to_numpy()
-            frame.loc[row, f"{robot}.{axis}_m"] += by_m
-            place = frame.loc[row, [f"{robot}.{axis}_m" for axis in "xyz"]].to_numpy(float)
+            at = range(len(t))[row]
+            frame.loc[at, f"{robot}.{axis}_m"] += by_m
+            place = frame.loc[at, [f"{robot}.{axis}_m" for axis in "xyz"]].to_numpy(float)
         with edited_table(folder, "samples") as samples:
-            k = int(np.searchsorted(samples["t_s"], t[row]))
-            assert samples["t_s"][k] == t[row]
-            assert samples["t_s"][k - 1] == t[row - 1]
-            samples.loc[k - 1, f"{robot}.v{axis}_m_s"] += by_m / (t[row] - t[row - 1])
-            samples.loc[k, f"{robot}.v{axis}_m_s"] -= by_m / (t[row + 1] - t[row])
+            k = int(np.searchsorted(samples["t_s"], t[at]))
+            assert samples["t_s"][[k - 1, k]].tolist() == t[[at - 1, at]].tolist()
+            samples.loc[k - 1, f"{robot}.v{axis}_m_s"] += by_m / (t[at] - t[at - 1])
+            samples.loc[k, f"{robot}.v{axis}_m_s"] -= by_m / (t[at + 1] - t[at])
         if robot == UGV:  # the decision variable that follows
             preset = samples.loc[k, [f"{UGV}.ref_{axis}_m" for axis in "xyz"]].to_numpy(float)
             with edited_table(folder) as frame:
-                x = np.linalg.norm(preset - place) + frame.loc[row, f"{UGV}.noise_m"]
-                frame.loc[row, f"{UGV}.decision_variable_m"] = x
+                x = np.linalg.norm(preset - place) + frame.loc[at, f"{UGV}.noise_m"]
+                frame.loc[at, f"{UGV}.decision_variable_m"] = x
 
     return edit
 

@@ -157,6 +157,11 @@ def refusals(report: Path, edit: Edit) -> dict[str, str]:
     return {line.claim: line.text for line in found if line.outcome != AGREES}
 
 
+def no_constants(text: str) -> None:
+    """Of `json.loads`, for strict JSON."""
+    raise AssertionError(f"{text} is no strict JSON")
+
+
 def _parts(value: Any) -> Any:
     """What a value is made of."""
     if isinstance(value, dict):

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from check.forgeries import RULES
-from check.forging import copy, mend
+from check.forging import copy, mend, no_constants
 
 from airground_drake import check
 from airground_drake.check import files, limits, rules
@@ -64,10 +64,6 @@ def test_a_fault_of_the_checker_is_no_verdict() -> None:
     done = subprocess.run([sys.executable, "-c", BROKEN], capture_output=True, text=True, check=False)
     assert done.returncode == 4
     assert "ZeroDivisionError" in done.stderr
-
-
-def no_constants(text: str) -> None:
-    raise AssertionError(f"{text} is no strict JSON")
 
 
 @pytest.mark.parametrize(

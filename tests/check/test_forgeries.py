@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.nested import places
 from check import concerted
 from check.concerted import FORGERIES, PROGRAMS, make, refused_by, simulating_once
 from check.forgeries import HOSTILE, RULES, UNMENDED
@@ -80,23 +81,8 @@ def test_every_rule_of_the_checker_has_a_forgery() -> None:
                 assert call.args[0].value in said, path.name
 
 
-def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, part in parts:
-        yield from leaves(part, (*path, key)) if isinstance(part, (dict, list)) else [(*path, key)]
-
-
-def items(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    for key, part in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
-        if isinstance(value, list):
-            yield (*path, key)
-        yield from items(part, (*path, key))
-
-
-def container(value: Any, path: tuple[Any, ...]) -> Any:
-    for key in path[:-1]:
-        value = value[key]
-    return value
+def leaves(value: Any) -> list[tuple[tuple[Any, ...], Any]]:
+    return [(path, part) for path, part in places(value) if not isinstance(part[path[-1]], (dict, list))]
 
 
 def changed(value: Any, others: Sequence[Any] = ()) -> Any:
@@ -119,9 +105,8 @@ SHARE = st.floats(0.0, 1.0, exclude_max=True)
 def test_any_changed_value_of_the_report_is_refused(report: Path, place: float) -> None:
     def edit(folder: Path) -> None:
         with edited_report(folder) as document:
-            places = [path for path in leaves(document) if path[0] not in FREE and path[-1] != "from_cache"]
-            path = places[int(place * len(places))]
-            part = container(document, path)
+            drawn = [each for each in leaves(document) if each[0][0] not in FREE and each[0][-1] != "from_cache"]
+            path, part = drawn[int(place * len(drawn))]
             part[path[-1]] = changed(part[path[-1]])
 
     assert attempt(report, edit)[0]
@@ -132,9 +117,8 @@ def test_any_changed_value_of_the_report_is_refused(report: Path, place: float) 
 def test_any_item_of_the_report_that_is_left_out_or_doubled_is_refused(report: Path, place: float, twice: bool) -> None:
     def edit(folder: Path) -> None:
         with edited_report(folder) as document:
-            places = [path for path in items(document) if path[0] not in FREE]
-            path = places[int(place * len(places))]
-            part = container(document, path)
+            items = [each for each in places(document) if isinstance(each[1], list) and each[0][0] not in FREE]
+            path, part = items[int(place * len(items))]
             if twice:
                 part.insert(path[-1], part[path[-1]])
             else:
@@ -214,8 +198,7 @@ def test_numbers_that_differ_by_rounding_only_agree(report: Path) -> None:
         for page in ("report.html", "junit.xml"):
             (folder / page).unlink()
         with edited_report(folder) as document:
-            for path in leaves(document["claims"]):
-                part = container(document["claims"], path)
+            for path, part in leaves(document["claims"]):
                 if isinstance(part[path[-1]], float):
                     part[path[-1]] = math.nextafter(part[path[-1]], math.inf)
 

@@ -3,8 +3,9 @@
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
+from builders.edits import with_cells, with_scenario
+from sim.blocks.both_programs import checked
 
 from airground_drake.check import plants, safety
 from airground_drake.check.rules import Disagreement
@@ -38,11 +39,7 @@ def given(name: str) -> Scenario:
 
 def run_of(name: str, duration_s: float) -> tuple[Trace, Run]:
     trace = simulate(validated(given(name), [f"duration_s={duration_s}"]), "a")
-    return trace, checked(trace, trace.states)
-
-
-def checked(trace: Trace, states: pd.DataFrame) -> Run:
-    return Run("a", resolved(trace.scenario), trace.events, states, trace.samples)
+    return trace, checked(trace)
 
 
 @pytest.mark.parametrize(("name", "duration_s"), [*RUNS, ("swap measured", 8.0)])
@@ -77,51 +74,43 @@ def test_the_checker_comes_to_the_same_verdicts(name: str, duration_s: float) ->
 )  # fmt: skip
 def test_a_forged_body_is_found(name: str, column: str, rule: str) -> None:
     trace, _ = run_of(name, 2.0)
-    states = trace.states.copy()
-    states.loc[20, column] += 1e-6
-    run, robot = checked(trace, states), column.partition(".")[0]
+    forged = with_cells(trace, "states", 20, column, lambda value: value + 1e-6)
     with pytest.raises(Disagreement, match=f"{rule} of a body"):
-        _moves_as_commanded(run, robot)
+        _moves_as_commanded(checked(forged), column.partition(".")[0])
 
 
 def test_an_axle_that_begins_too_near_or_rolls_back_is_found() -> None:
     trace, _ = run_of("turtlebots forwards", 2.0)
-    states, place = trace.states.copy(), ["burger.body_x_m", "burger.body_y_m"]
-    states.loc[0, place] = next(iter(trace.scenario.barriers.values())).position_m[:2]
-    assert refuted_for(trace, states) == "safe start of the bodies"
-    states, heading = trace.states.copy(), trace.states["burger.heading_rad"][20]
-    states.loc[20, place] -= 0.1 * np.array([np.cos(heading), np.sin(heading)])
-    assert refuted_for(trace, states) == "never backwards"
+    place, barrier = ["burger.body_x_m", "burger.body_y_m"], next(iter(trace.scenario.barriers.values()))
+    assert refuted_for(with_cells(trace, "states", 0, place, barrier.position_m[:2])) == "safe start of the bodies"
+    heading = trace.states["burger.heading_rad"][20]
+    back = 0.1 * np.array([np.cos(heading), np.sin(heading)])
+    assert refuted_for(with_cells(trace, "states", 20, place, lambda at: at - back)) == "never backwards"
 
 
 def test_bodies_that_begin_far_apart_are_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     trace, _ = run_of("lagging", 2.0)
     places, signed_m = list[int](), Part.signed_m
     monkeypatch.setattr(Part, "signed_m", lambda part, at_m: places.append(len(at_m)) or signed_m(part, at_m))
-    safety._constants(checked(trace, trace.states))
+    safety._constants(checked(trace))
     assert sum(places) < 100
 
 
 def test_a_car_that_turns_more_sharply_than_it_can_is_found() -> None:
     trace, _ = run_of("turtlebots car", 2.0)
-    states = trace.states.copy()
-    states.loc[20:, "burger.heading_rad"] += 0.5
-    assert refuted_for(trace, states) == "least turning radius"
+    turned = with_cells(trace, "states", slice(20, None), "burger.heading_rad", lambda heading: heading + 0.5)
+    assert refuted_for(turned) == "least turning radius"
 
 
 def test_positions_that_are_measured_worse_than_declared_or_with_too_small_a_gain_are_found() -> None:
     trace, _ = run_of("swap measured", 1.0)
-    samples, data = trace.samples.copy(), resolved(trace.scenario)
-    samples.loc[10, f"{trace.ugvs[0]}.seen_x_m"] += 0.05
-    far = safety.safe_hyp(Run("a", data, trace.events, trace.states, samples))
-    control = data["control"] | {"avoidance_gain_1_s": 0.1}
-    slow = safety.safe_hyp(Run("a", data | {"control": control}, trace.events, trace.states, trace.samples))
-    rules = [found.because.rule for found in (far, slow) if found.because is not None]
-    assert rules == ["error of the measured position", "gain for errors"]
+    far = with_cells(trace, "samples", 10, f"{trace.ugvs[0]}.seen_x_m", lambda seen: seen + 0.05)
+    assert refuted_for(far) == "error of the measured position"
+    assert refuted_for(with_scenario(trace, control__avoidance_gain_1_s=0.1)) == "gain for errors"
 
 
-def refuted_for(trace: Trace, states: pd.DataFrame) -> str:
-    found = safety.safe_hyp(checked(trace, states))
+def refuted_for(trace: Trace) -> str:
+    found = safety.safe_hyp(checked(trace))
     assert found.because is not None
     return found.because.rule
 

@@ -8,8 +8,8 @@ from typing import Any
 import pandas as pd
 import pytest
 from builders import logs
-from check.forgeries import all_of, cells, everywhere
-from check.forging import Edit, edited_table, mend, read_table, refusals, trace
+from check.forgeries import all_of, cells, everywhere, leap
+from check.forging import Edit, mend, read_table, refusals, trace
 from sharing import once
 
 from airground_drake.check.report import DECIDED, SCHEMA, SHAPE
@@ -116,18 +116,6 @@ def test_positions_among_walls_are_judged(
     assert max(pair.missed_m for pair in pairs) == pytest.approx(by_m, abs=1e-9)
 
 
-def ahead(by_m: float) -> Edit:
-    def edit(folder: Path) -> None:
-        with edited_table(folder) as frame, edited_table(folder, "samples") as samples:
-            row, sample = len(frame) - 11, len(samples) - 10
-            assert frame["t_s"][row] == samples["t_s"][sample]
-            frame.loc[row, "ugv1.x_m"] += by_m
-            samples.loc[sample - 1, "ugv1.vx_m_s"] += by_m / 0.05
-            samples.loc[sample, "ugv1.vx_m_s"] -= by_m / 0.05
-
-    return edit
-
-
 def moved(by_m: float) -> Callable[[Any], Any]:
     return lambda corners: [[x + by_m, y] for x, y in corners]
 
@@ -151,9 +139,9 @@ FORGERIES: dict[str, tuple[str, str, Edit]] = {
     "map of other cells": ("map", "SAFE-TRACE", everywhere("map", "cells", "rectangles", 1, 2, value=0)),
     "map moved": ("map", "SAFE-TRACE", everywhere("map", "cells", "origin", 0, value=1.001)),
     "map without cells": ("map", "SAFE-TRACE", everywhere("map", "cells", "rectangles", value=[])),
-    "onto the wall": ("wall", "SAFE-TRACE", ahead(0.6)),
-    "through the wall and back between rows that are clear of it": ("wall", "SAFE-TRACE", ahead(1.3)),
-    "through the wall and back without a collision": ("wall", "events", ahead(1.3)),
+    "onto the wall": ("wall", "SAFE-TRACE", leap("ugv1", 0.6, -11)),
+    "through the wall and back between rows that are clear of it": ("wall", "SAFE-TRACE", leap("ugv1", 1.3, -11)),
+    "through the wall and back without a collision": ("wall", "events", leap("ugv1", 1.3, -11)),
     "onto the wall without a command": ("wall", "trace", cells("ugv1.x_m", lambda old: old + 0.6, 90)),
     "wall that might move": ("wall", "SAFE-OWN", everywhere("obstacles", "wall", "max_speed_m_s", value=1.0)),
     "edges that cross": (

@@ -1,13 +1,12 @@
 """The oracle of decisions: silent on honest runs, and not on records that a faulty gatekeeper would leave."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from builders.decisions import ALL_PLANS, STAGES, GateData
-from builders.edits import with_decision
+from builders.edits import with_cells, with_decision
 from hypothesis import given
 from hypothesis import strategies as st
 from verify.runs.cases import (
@@ -117,12 +116,7 @@ def changed(name: str, index: Any, *, factor: bool = False) -> Callable[[Trace, 
 
 
 def moved(name: str) -> Callable[[Trace, float], Trace]:
-    def edit(trace: Trace, by: float) -> Trace:
-        decisions = trace.decisions.copy()
-        decisions.loc[len(decisions) - 1, name] += by
-        return replace(trace, decisions=decisions)
-
-    return edit
+    return lambda trace, by: with_cells(trace, "decisions", len(trace.decisions) - 1, name, lambda value: value + by)
 
 
 def with_bound(worked_out: Callable[[Bounded, float], float]) -> Edit:

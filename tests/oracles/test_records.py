@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from builders.edits import bumped, moved, with_meta, with_scenario
+from builders.edits import bumped, moved, with_cells, with_meta, with_scenario
 from verify.judging import decided
 from verify.runs.cases import (
     A_D,
@@ -197,21 +197,19 @@ def at_the_end(robot: str) -> Callable[[Trace, float], Trace]:
 
 def longer_way_left(trace: Trace, by: float) -> Trace:
     """Farther from the goal than is possible, with the cost of that."""
-    decisions = trace.decisions.copy()
-    k = int(np.argmax(decisions["accept_left_m"].to_numpy()))
-    given = decisions.iloc[k].to_dict()
+    k = int(np.argmax(trace.decisions["accept_left_m"].to_numpy()))
+    given = trace.decisions.iloc[k].to_dict()
     left = foreseen(trace)[given["t_s"], given["number"]][1].most_left_m + by
     speed = trace.scenario.ugvs[given["robot"]].preset.speed_m_s
-    decisions.loc[k, "accept_left_m"] = left
-    decisions.loc[k, "accept_outcome_m2_s"] += (left**3 - given["accept_left_m"] ** 3) / (3.0 * speed)
-    return replace(trace, decisions=decisions)
+    cost = given["accept_outcome_m2_s"] + (left**3 - given["accept_left_m"] ** 3) / (3.0 * speed)
+    return with_cells(trace, "decisions", k, ["accept_left_m", "accept_outcome_m2_s"], [left, cost])
 
 
 def outcome(trace: Trace, by: float) -> Trace:
     """Relative, as outcomes are compared."""
-    decisions = trace.decisions.copy()
-    decisions.loc[int(np.argmax(decisions["accept_outcome_m2_s"].to_numpy())), "accept_outcome_m2_s"] *= 1.0 + by
-    return replace(trace, decisions=decisions)
+    name = "accept_outcome_m2_s"
+    k = int(np.argmax(trace.decisions[name].to_numpy()))
+    return with_cells(trace, "decisions", k, name, lambda cost: cost * (1.0 + by))
 
 
 TOLERANCES: dict[str, tuple[str, str, float, Callable[[Trace, float], Trace]]] = {
@@ -264,9 +262,7 @@ def test_a_command_is_judged_by_what_its_robot_saw(run: Callable[[str, str], Tra
     controller = UgvController(make_world(trace.scenario), make_law(trace.scenario, method_of("d"), "augmented"))
     wanted = (np.array([of(ugv)[k] for ugv in trace.ugvs]) for of in (trace.reference, trace.reference_rate))
     command = controller.velocity(t, places, *wanted, [None] * len(trace.ugvs))[0]
-    samples = trace.samples.copy()
-    samples.loc[k, [f"ugv1.v{axis}_m_s" for axis in "xyz"]] = command
-    blind = replace(trace, samples=samples)
+    blind = with_cells(trace, "samples", k, [f"ugv1.v{axis}_m_s" for axis in "xyz"], command)
     assert [(fault.robot, fault.t_s) for fault in ORACLES["commands"](blind)][:1] == [("ugv1", t)]
     row = {"t_s": t, "by": "ugv1", "of": "ugv2", **dict(zip(("x_m", "y_m", "z_m"), places[1], strict=True))}
     sighted = replace(blind, seen=typed([row | {"measured_s": t}], SEEN_COLUMNS))

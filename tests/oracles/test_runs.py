@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import maps
 import numpy as np
 import persons
 import pytest
@@ -201,10 +202,8 @@ def test_a_prediction_that_depends_on_rounding_is_not_compared(monkeypatch: pyte
     data: dict[str, Any] = {
         "name": "meeting", "duration_s": 1.6, "decision": {"threshold": {"zeta_m": 0.2}, "release_m": 0.1},
         "ugvs": {
-            ugv: {"start_m": [x, y, 0.0], "target_m": [-x, -y, 0.0], "max_speed_m_s": 6.0}
-            | {"preset": {"waypoints_m": [[x, y, 0.0], [-x, -y, 0.0]], "speed_m_s": 1.0}}
-            for ugv, (x, y) in ((ugv, (0.7071068518972258 * x, 0.7071068518972258 * y))
-                                for ugv, (x, y) in corners.items())
+            ugv: maps.straight(corner, -corner, 1.0, max_speed_m_s=6.0)
+            for ugv, corner in ((ugv, 0.7071068518972258 * np.array(corner)) for ugv, corner in corners.items())
         },
         "uav": {"start_m": [0.0, 0.0, 2.0], "target_m": [0.0, 0.0, 2.0], "altitude_m": 2.0, "max_speed_m_s": 10.0},
         "safe_distance": dict.fromkeys(("obstacle_m", "ugv_m", "air_ground_m"), 1e-3) | {"collision_m": 2e-5},

@@ -3,10 +3,10 @@
 import copy
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
+from builders.nested import places
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
@@ -21,11 +21,6 @@ from airground_drake.scenario.load import load, resolved
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One for all examples: a fixture of its own for each would not be made anew."""
     return tmp_path_factory.mktemp("fuzz")
-
-
-def leaves(node: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
-    return [found for key, child in items for found in ((*path, key), *leaves(child, (*path, key)))]
 
 
 JUNK = st.one_of(
@@ -65,13 +60,10 @@ def loads_or_explains(path: Path, content: bytes, overrides: Sequence[str] = ())
 def test_mutated_data(folder: Path, data: st.DataObject) -> None:
     mutated = copy.deepcopy(SMALL_DATA)
     for _ in range(data.draw(st.integers(1, 2))):
-        paths = leaves(mutated)
-        *parents, last = data.draw(st.sampled_from(paths)) if paths else ("name",)
-        node = mutated
-        for part in parents:
-            node = node[part]
+        found = [*places(mutated)]
+        (*_, last), node = found[data.draw(st.integers(0, len(found) - 1))] if found else (("name",), mutated)
         action = data.draw(st.sampled_from(["replace", "replace", "drop", "add"]))
-        if action == "drop" and paths:
+        if action == "drop" and found:
             del node[last]
         elif action == "add" and isinstance(node, dict):
             node[data.draw(st.text(max_size=4))] = data.draw(JUNK)
@@ -94,7 +86,7 @@ def test_mutated_text(folder: Path, data: st.DataObject) -> None:
 
 @examples(40)
 @given(
-    key=st.one_of(st.sampled_from([".".join(map(str, path)) for path in leaves(SMALL_DATA)]), st.text()),
+    key=st.one_of(st.sampled_from([".".join(map(str, path)) for path, _ in places(SMALL_DATA)]), st.text()),
     value=st.one_of(JUNK.map(str), st.text(max_size=8)),
 )
 def test_random_overrides(folder: Path, key: str, value: str) -> None:

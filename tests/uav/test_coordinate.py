@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import maps
 import numpy as np
 import pytest
 from builders.observations import mate, seen
@@ -143,8 +144,7 @@ def test_a_bay_that_is_too_narrow_for_the_full_clearance_is_waited_in() -> None:
     """Two change places in a corridor; the bay is 1 m wide, and who waits in it needs 0.8 m."""
     north = [[-4.6, 0.5], [-0.5, 0.5], [-0.5, 1.5], [0.5, 1.5], [0.5, 0.5], [4.6, 0.5], [4.6, -0.5]]
     ugvs = {
-        name: {"start_m": [x, 0.0, 0.0], "target_m": [-x, 0.0, 0.0], "max_speed_m_s": 1.0, "radius_m": 0.2}
-        | {"preset": {"waypoints_m": [[x, 0.0, 0.0], [-x, 0.0, 0.0]], "speed_m_s": 0.6}}
+        name: maps.straight((x, 0.0), (-x, 0.0), 0.6, max_speed_m_s=1.0, radius_m=0.2)
         for name, x in (("r1", -4.0), ("r2", 4.0))
     }
     scenario = from_data(
@@ -167,9 +167,7 @@ def test_ugvs_that_have_met_are_planned_for_with_less_spacing() -> None:
     """Twelve on a tight circle, which drive through its centre: where they stop, the full spacing has no room."""
     ends = [(4.8 * math.cos(k * math.pi / 6.0), 4.8 * math.sin(k * math.pi / 6.0)) for k in range(12)]
     ugvs = {
-        f"r{k}": {"start_m": [x, y, 0.0], "target_m": [-x, -y, 0.0], "max_speed_m_s": 2.0, "radius_m": 0.2}
-        | {"preset": {"waypoints_m": [[x, y, 0.0], [-x, -y, 0.0]], "speed_m_s": 1.0}}
-        for k, (x, y) in enumerate(ends)
+        f"r{k}": maps.straight((x, y), (-x, -y), 1.0, max_speed_m_s=2.0, radius_m=0.2) for k, (x, y) in enumerate(ends)
     }
     scenario = from_data(
         {

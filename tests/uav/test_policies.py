@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.observations import mate, seen
+from sim.blocks.both_programs import found
 from timeline import kinds
 
 from airground_drake.base.registry import POLICIES
@@ -18,7 +19,6 @@ from airground_drake.sim.simulation import simulate
 from airground_drake.uav.database import BehaviourDatabase, Negotiation
 from airground_drake.uav.policy import Observation, Policy
 from airground_drake.uav.wrong import Hostile
-from airground_drake.verify import judge
 
 
 class Raises(Policy):
@@ -108,8 +108,7 @@ def test_no_wrong_policy_gets_past_method_d(case_a: Scenario, name: str, paramet
     case_a.duration_s = 20.0
     of_run = simulate(case_a, "d")
     assert "proposal" in kinds(of_run, "ugv1")
-    statuses = {v.claim.id: v.status for v in judge(of_run)}
-    assert statuses["SAFE-TRACE"] == statuses["SAFE-HYP"] == "holds"
+    assert found(of_run, "SAFE-TRACE", "SAFE-HYP") == {"SAFE-TRACE": "holds", "SAFE-HYP": "holds"}
 
 
 def test_the_hostile_policy_stays_where_it_is_hardly_away_from_its_goal() -> None:

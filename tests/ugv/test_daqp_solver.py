@@ -28,6 +28,13 @@ Made = tuple[MathematicalProgram, Any]
 """A program and its variables."""
 
 
+def solved(made: MathematicalProgram, *given: Any) -> MathematicalProgramResult:
+    """Its result; a guess and options may be given."""
+    result = SOLVER.Solve(made, *given)
+    assert result is not None
+    return result
+
+
 def program(count: int, binaries: int = 0) -> Made:
     made = MathematicalProgram()
     parts = [made.NewBinaryVariables(binaries, "b")] if binaries else []
@@ -105,8 +112,7 @@ def rows_without_variables() -> Made:
 )  # fmt: skip
 def test_known_answers(make: Callable[[], Made], cost: float, solution: list[float] | None) -> None:
     made, x = make()
-    result = SOLVER.Solve(made)
-    assert result is not None
+    result = solved(made)
     assert result.get_solution_result() == FOUND
     assert result.is_success()
     assert result.get_optimal_cost() == pytest.approx(cost, abs=1e-7)
@@ -168,8 +174,7 @@ def downhill_with_a_choice() -> Made:
     ],
 )  # fmt: skip
 def test_no_solution(make: Callable[[], Made], ended: SolutionResult, cost: float) -> None:
-    result = SOLVER.Solve(make()[0])
-    assert result is not None
+    result = solved(make()[0])
     assert (result.get_solution_result(), result.get_optimal_cost()) == (ended, cost)
     assert not result.is_success()
 
@@ -193,40 +198,34 @@ def options(**values: float) -> SolverOptions:
 def test_limits() -> None:
     made, x = hard()
     guess = np.ones(len(x))
-    stopped = SOLVER.Solve(made, guess, options(time_limit=0.01))
-    assert stopped is not None
+    stopped = solved(made, guess, options(time_limit=0.01))
     assert stopped.get_solution_result() == LIMIT
     at_guess = float(made.EvalBinding(made.quadratic_costs()[0], guess)[0])
     assert stopped.get_optimal_cost() <= at_guess  # the guess, or better
     assert made.CheckSatisfied(made.GetAllConstraints(), stopped.GetSolution(), 1e-9)
     smaller = infeasible(slack)[0]
-    few = SOLVER.Solve(smaller, None, options(iter_limit=1))
-    assert few is not None
+    few = solved(smaller, None, options(iter_limit=1))
     assert few.get_solution_result() == LIMIT
     made.SetSolverOption(DaqpSolver.id(), "time_limit", 10.0)  # those of the call count more
-    assert SOLVER.Solve(made, guess, options(time_limit=0.01)).get_solution_result() == LIMIT  # type: ignore[union-attr]
+    assert solved(made, guess, options(time_limit=0.01)).get_solution_result() == LIMIT
 
 
 def test_a_guess_cuts_the_search_without_changing_its_end() -> None:
     made, x = hard(14)
-    free = SOLVER.Solve(made)
-    assert free is not None
+    free = solved(made)
     best, guess = free.get_optimal_cost(), free.GetSolution()
-    guided = SOLVER.Solve(made, guess)
-    assert guided is not None
+    guided = solved(made, guess)
     assert guided.get_optimal_cost() == pytest.approx(best, rel=1e-9)
     assert guided.get_solver_details().nodes < free.get_solver_details().nodes
     made.SetInitialGuess(x, guess)  # the program's own
-    assert SOLVER.Solve(made).get_solver_details().nodes < free.get_solver_details().nodes  # type: ignore[union-attr]
-    wrong = SOLVER.Solve(made, np.full(14, 0.5))  # no guess, as it is not binary
-    assert wrong is not None
+    assert solved(made).get_solver_details().nodes < free.get_solver_details().nodes
+    wrong = solved(made, np.full(14, 0.5))  # no guess, as it is not binary
     assert wrong.get_optimal_cost() == pytest.approx(best, rel=1e-9)
 
 
 def test_relaxed_binary_variables_have_shares() -> None:
     made, _ = hard(14)
-    relaxed = SOLVER.Solve(made, None, options(relaxed=1))
-    assert relaxed is not None
+    relaxed = solved(made, None, options(relaxed=1))
     np.testing.assert_allclose(relaxed.GetSolution(), 0.5, atol=1e-9)
 
 
@@ -240,8 +239,7 @@ def test_it_is_a_solver_interface_with_both_overloads() -> None:
             made, x = make()
             assert SOLVER.Solve(made, None, None, result) is None
             assert result.is_success()
-            expected = SOLVER.Solve(made)
-            assert expected is not None
+            expected = solved(made)
             np.testing.assert_array_equal(result.get_x_val(), expected.get_x_val())
             assert result.get_optimal_cost() == expected.get_optimal_cost()
             if make is linear or isinstance(result, DaqpResult):
@@ -265,8 +263,7 @@ def test_what_it_does_not_solve_it_refuses() -> None:
         SOLVER.Solve(linear()[0], None, options(MIPGap=0.1))
     made, x = linear()
     made.AddLinearCost([np.nan, 0.0], 0.0, x)
-    result = SOLVER.Solve(made)
-    assert result is not None
+    result = solved(made)
     assert result.get_solution_result() == SolutionResult.kInvalidInput
 
 
@@ -321,8 +318,7 @@ def test_random_programs_have_the_optimum_of_other_solvers(*, binaries: int, qua
     for _ in range(60):
         made, x = drawn(rng, binaries, quadratic=quadratic)
         best = best_of_all(made, x[:binaries])
-        result = SOLVER.Solve(made)
-        assert result is not None
+        result = solved(made)
         expected = FOUND if np.isfinite(best) else UNBOUNDED if best < 0.0 else INFEASIBLE
         assert result.get_solution_result() == expected
         assert result.get_optimal_cost() == pytest.approx(best, rel=1e-6, abs=1e-6)
@@ -340,7 +336,6 @@ def test_multipliers_are_those_of_osqp() -> None:
         accurate = SolverOptions()
         for name in ("eps_abs", "eps_rel"):
             accurate.SetOption(OsqpSolver.id(), name, 1e-9)
-        result = SOLVER.Solve(made)
-        assert result is not None
+        result = solved(made)
         theirs = OsqpSolver().Solve(made, None, accurate).GetDualSolution(rows)
         np.testing.assert_allclose(result.get_solver_details().multipliers, theirs, atol=1e-5)

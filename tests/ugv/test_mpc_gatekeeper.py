@@ -46,23 +46,23 @@ class NotFinite(Agreeing):
     status = "refused_not_finite"
 
 
+def sampled(route: Agreeing, t: float, number: int, before: GatekeeperState) -> GatekeeperState:
+    """After a sample at which a UGV is asked to stay where it is."""
+    law, places = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True), np.zeros((2, 3))
+    stays = Motion(np.zeros(1), places[:1])
+    gate = PaperGatekeepers(world(("ugv",)), law, [stays], route, Horizon(4, 1, 1.0, 1.0), RULES)
+    return gate.sample(Inputs(t, (Proposal("way", 0.0, stays, number=number),), places, places, law), before)
+
+
 def test_without_a_plan_it_is_refused_and_no_costs_are_told() -> None:
-    law = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True)
-    motion = Motion(np.zeros(1), np.zeros((1, 3)))
-    gate = PaperGatekeepers(world(("ugv",)), law, [motion], NotFinite(), Horizon(4, 1, 1.0, 1.0), RULES)
-    now = Inputs(0.05, (Proposal("way", 0.0, motion, number=0),), np.zeros((2, 3)), np.zeros((2, 3)), law)
-    (decision,) = gate.sample(now, GatekeeperState.empty(1)).decisions
+    (decision,) = sampled(NotFinite(), 0.05, 0, GatekeeperState.empty(1)).decisions
     assert (decision.accepted, decision.throughout) == (False, (-1.0, -1.0))
 
 
 def test_the_dwell_of_an_answer_begins_anew_with_each_proposal() -> None:
-    law, places = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=True), np.zeros((2, 3))
-    motion = Motion(np.zeros(1), places[:1])
-    gate = PaperGatekeepers(world(("ugv",)), law, [motion], Agreeing(), Horizon(4, 1, 1.0, 1.0), RULES)
     state, since = GatekeeperState.empty(1), []
     for k, number in enumerate((0, 0, 1, 1)):
-        proposal = Proposal("way", 0.0, motion, number=number)
-        state = gate.sample(Inputs(0.05 * (k + 1), (proposal,), places, places, law), state)
+        state = sampled(Agreeing(), 0.05 * (k + 1), number, state)
         assert state.answers == (ACCEPT, number)
         since.append(state.since[0])
     assert since == [0.05, 0.05, 0.05 * 3, 0.05 * 3]

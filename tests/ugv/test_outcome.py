@@ -4,17 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.problems import LAW
 
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.geometry.outline import balls, prism, stacked
 from airground_drake.model.geometry.paths import shortest_path
-from airground_drake.model.law.avoidance import Avoidance
-from airground_drake.model.law.ugv_law import UgvLaw
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.outcome import Outcome, Outlook, outcomes, robot_at, way_left
 from airground_drake.ugv.rollout import View
 
-LAW = UgvLaw(Avoidance(3.0, 0.05, 4.0), 2.0, 1.5, intervention_on_top=False)
 LOOK = Outlook(longest=20.0)
 Points = tuple[tuple[float, float], ...]
 

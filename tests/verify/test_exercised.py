@@ -6,7 +6,7 @@ from typing import Any
 
 import persons
 import pytest
-from builders.edits import with_meta, with_samples
+from builders.edits import with_cells, with_meta
 from verify.judging import CLAIMS, decided
 
 from airground_drake.base.statuses import NOTHING, declared, meets, outcome
@@ -59,7 +59,7 @@ def test_a_run_with_several_triggers_and_proposals_exercises_every_claim(
 def without_messages(trace: Trace) -> Trace:
     tables = {name: getattr(trace, name).iloc[:0] for name in ("decisions", "problems", "proposals")}
     kept = [event for event in trace.events if event["kind"] not in ("proposal", "accept", "refuse")]
-    idle = with_samples(trace, lambda samples: samples.assign(**{f"{ugv}.executing": -1.0 for ugv in trace.ugvs}))
+    idle = with_cells(trace, "samples", slice(None), [f"{ugv}.executing" for ugv in trace.ugvs], -1.0)
     return replace(with_meta(idle, events=kept), **tables)
 
 

@@ -100,17 +100,11 @@ class Neighbours(NamedTuple):
     max_speed: Array
 
     @classmethod
-    def at_rest(cls, still: Array, max_speed: Array, radius: float = 0.0) -> Self:
-        """UGVs that avoid static outlines only, (m, W), not each other.
-
-        Args:
-            still: the outlines, see `model.geometry.outline`.
-            max_speed: speed limits of the k UGVs, (k,), m/s.
-            radius: of their bodies, m.
-        """
+    def at_rest(cls, still: Array, max_speed: Array) -> Self:
+        """Point-like UGVs with speed limits (k,), m/s, that avoid static outlines only, (m, W), not each other."""
         count, limits = len(max_speed), np.asarray(max_speed, dtype=np.float64)
         nobody, own = np.zeros((count, 0), dtype=np.intp), np.arange(count)
-        distance = np.tile(outline.keep(still, radius), (count, 1))
+        distance = np.tile(outline.keep(still, 0.0), (count, 1))
         plane = np.tile([1.0, 1.0, 0.0], (count, 1))
         return cls(own, own[:0], nobody, still, outline.stacked([]), distance, np.ones_like(distance), plane, limits)
 

@@ -58,9 +58,6 @@ class Delay(Plant):
     def theorems(self) -> tuple[str, ...]:
         return ("Plants.delay", *self.after.theorems)
 
-    def trails(self, speed_m_s: float) -> bool:
-        return True
-
     def bounds(self, speed_m_s: float) -> Bounds:
         return self.after.bounds(speed_m_s)._replace(delay_s=self.periods * self.period_s)
 

@@ -38,9 +38,6 @@ class Lag(Plant):
     passive_theorems: ClassVar[tuple[str, ...]] = ("Mixed.lagging",)
     unproved: ClassVar[str] = ""
 
-    def trails(self, speed_m_s: float) -> bool:
-        return True
-
     def bounds(self, speed_m_s: float) -> Bounds:
         return Bounds(lag_s=self.time_s, speed_m_s=speed_m_s)
 

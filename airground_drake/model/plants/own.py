@@ -52,9 +52,6 @@ class Own(Plant):
     theorems: ClassVar[tuple[str, ...]] = ("Mixed.drifting", "Mixed.entry_keeps")
     unproved: ClassVar[str] = "its drift and cover are declared: the distance budget says what is proved of it"
 
-    def trails(self, speed_m_s: float) -> bool:
-        return True
-
     def bounds(self, speed_m_s: float) -> Bounds:
         return Bounds(cover_m=self.cover_m, drift_m_s=self.drift_m_s, speed_m_s=speed_m_s)
 

@@ -118,7 +118,7 @@ class Plant:
 
     def trails(self, speed_m_s: float) -> bool:
         """Whether the body may fall behind a motion of its steered point at a speed."""
-        return False
+        return bool(self.signals)
 
     def steered(self, start: Array) -> Array:
         """The point that the law steers, (3,), m, of a body at rest at `start`, (3,), m."""

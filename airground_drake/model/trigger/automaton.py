@@ -141,6 +141,8 @@ class TriggerState:
 class Trigger:
     """The automaton's parameters, and its transitions for one UGV.
 
+    With release = zeta and no dwell it is the paper's trigger (20), which intervenes exactly while x >= zeta.
+
     Attributes:
         zeta: decision threshold, m.
         release: level at which an intervention ends, m, at most zeta.
@@ -154,11 +156,6 @@ class Trigger:
     def __post_init__(self) -> None:
         if not (self.zeta > 0.0 and self.release <= self.zeta and self.dwell >= 0.0):
             raise ValueError(f"a trigger needs zeta > 0, release <= zeta and dwell >= 0, got {self}")
-
-    @classmethod
-    def bare(cls, zeta: float) -> Trigger:
-        """The paper's trigger (20): intervening exactly while x >= zeta."""
-        return cls(zeta=zeta, release=zeta, dwell=0.0)
 
     @property
     def levels(self) -> Array:

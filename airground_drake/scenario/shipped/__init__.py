@@ -1,5 +1,6 @@
-"""The scenarios that come with the package: their files and titles, by name."""
+"""The scenarios that come with the package: their files and titles, by name; names and paths of others."""
 
+import re
 import shlex
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -8,6 +9,7 @@ from pathlib import Path
 import yaml
 
 from airground_drake.base.errors import one_line
+from airground_drake.base.limits import MAX_NAME
 
 AUDIT = "audit"  # the argument of `airground report` that is neither a scenario nor a file
 
@@ -27,6 +29,11 @@ def argument(path: Path) -> str:
     """A scenario's path as an argument of the command line: quoted, and distinct from options and shipped names."""
     text = str(path)
     return one_line(shlex.quote(f"./{text}" if text.startswith("-") or text in (AUDIT, *shipped()) else text))
+
+
+def scenario_name(text: str, instead: str) -> str:
+    """A text as a name that a scenario may have: letters, digits and underscores; `instead` if nothing is left."""
+    return re.sub(r"^[\W\d_]+|[\W_]+$", "", re.sub(r"\W+", "_", text, flags=re.ASCII))[:MAX_NAME] or instead
 
 
 def json_schema_file() -> Traversable:

@@ -39,10 +39,11 @@ from airground_drake.sim.recording import Done, trace_of
 from airground_drake.sim.trace import Trace
 from airground_drake.uav.database import BehaviourDatabase
 from airground_drake.uav.halts import NOT_WATCHED, room, standing, watched
-from airground_drake.uav.messages import ACCEPT, NOTHING, SILENT, accepted_proposals, sightings
+from airground_drake.uav.messages import NOTHING, accepted_proposals, sightings
 from airground_drake.uav.planner import Instant, PlannerState, sent_after
 from airground_drake.uav.policy import Proposal
 from airground_drake.ugv.answer import GatekeeperDecision
+from airground_drake.ugv.desk import obeyed
 from airground_drake.ugv.mpc_gatekeeper import Gatekeepers, GatekeeperState, Inputs
 
 
@@ -364,13 +365,7 @@ class Going:
 
     def _answers(self) -> Sequence[float]:
         """The answers in force, (2n,); without gatekeepers every proposal is accepted at once."""
-        if self._batch.gatekeepers is not None:
-            return self._answering.answers
-        return [
-            number
-            for proposal in self._memory.proposals
-            for number in ((SILENT, -1.0) if proposal is None else (ACCEPT, proposal.number))
-        ]
+        return obeyed(self._memory.proposals) if self._batch.gatekeepers is None else self._answering.answers
 
 
 @lru_cache(maxsize=8)

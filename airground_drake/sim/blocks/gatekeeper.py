@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
@@ -10,14 +11,12 @@ from airground_drake.base.arrays import Array
 from airground_drake.model.bodies.world import World
 from airground_drake.sim.blocks.lifetime import declare_output, weakly
 from airground_drake.sim.blocks.signals import (
-    Answer,
     Messages,
     UgvGains,
     declare_bodies,
     declare_headings,
     declare_inbox,
     keep,
-    laid_out,
     no_reports,
 )
 from airground_drake.sim.blocks.ticks import Ticks
@@ -153,7 +152,7 @@ class DirectAcceptance(LeafSystem):
 
     def _answers(self, context: Context) -> Array:
         held = self.desk(context).held if self._channel else self._proposals.Eval(context)
-        return laid_out(Answer, obeyed(held))
+        return np.array(obeyed(held), dtype=np.float64)
 
     def _update(self, context: Context, state: State) -> EventStatus:
         return keep(state, self._state, self._now(context))

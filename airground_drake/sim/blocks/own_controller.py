@@ -16,7 +16,7 @@ from pydrake.systems.framework import (
     System,
 )
 
-from airground_drake.base.errors import PluginError, described, short
+from airground_drake.base.errors import PluginError, described, raised_as, short
 from airground_drake.base.registry import UGV_CONTROLLERS
 from airground_drake.model.bodies.world import World
 from airground_drake.model.law.ugv_law import UgvLaw
@@ -50,10 +50,8 @@ class CheckedCommands(LeafSystem):
     def _calc(self, index: InputPortIndex, context: Context, output: BasicVector) -> None:
         source = self.get_input_port(index)
         name = source.get_name()
-        try:
+        with raised_as(lambda error: PluginError(f"{self._about}: {described(error)}")):
             value = source.Eval(context)
-        except Exception as error:  # the user's code may raise anything
-            raise PluginError(f"{self._about}: {described(error)}") from error
         wanted = ""
         if not np.isfinite(value).all():
             wanted = "finite numbers"

@@ -137,11 +137,6 @@ class OwnPlant(NamedTuple):
     cover_m: float
     parameters: Mapping[str, float] = MappingProxyType({})
 
-    @property
-    def name(self) -> str:
-        """Its name in a scenario, see `name_of`."""
-        return name_of(self.make)
-
 
 def declared(
     scenario: Scenario,
@@ -160,8 +155,8 @@ def declared(
             wanted = "allowed: an OwnPlant, made by a class or a function"
             raise PluginError(f"the plant of {robot} is {short(repr(made))}; {wanted}")
         given = OwnKeys(
-            kind=code.name, drift_m_s=code.drift_m_s, cover_m=code.cover_m, parameters={**code.parameters}
-        )  # fmt: skip
+            kind=name_of(code.make), drift_m_s=code.drift_m_s, cover_m=code.cover_m, parameters={**code.parameters}
+        )
         changed.robots[robot].plant = [given]
     if ugv_controller is not None:
         other = isinstance(ugv_controller, type) and not issubclass(ugv_controller, System)
@@ -241,15 +236,14 @@ class OwnBody(LeafSystem):
     def _now(self, context: Context, index: InputPortIndex) -> Array:
         """A port's value; raises PluginError if it cannot be computed, is not finite, or is off the ground."""
         source = self.get_input_port(index)
-        try:
+        with raised_as(lambda error: PluginError(f"{self._name}: {described(error)}")):
             value: Array = source.Eval(context)
-        except Exception as error:  # the user's code may raise anything
-            raise PluginError(f"{self._name}: {described(error)}") from error
+        wanted = ""
         if not np.isfinite(value).all():
             wanted = "allowed: finite numbers"
-            raise PluginError(f"{self._name} has {value.tolist()} at its output {source.get_name()}; {wanted}")
-        if self._on_ground and len(value) == 3 and abs(value[2]) > GROUND_M:
+        elif self._on_ground and len(value) == 3 and abs(value[2]) > GROUND_M:
             wanted = f"allowed for a UGV: the height 0, to {GROUND_M:g} m"
+        if wanted:
             raise PluginError(f"{self._name} has {value.tolist()} at its output {source.get_name()}; {wanted}")
         return value
 
@@ -345,14 +339,10 @@ def _checked(system: System, outputs: Mapping[str, OutputPort], checked: OwnBody
 
 def _begins_at(diagram: Diagram, start_m: Array, about: str) -> None:
     """Refuse a plant whose body is not at its start, (3,), m, in the default context."""
-    try:
+    with raised_as(lambda error: PluginError(f"{about}: {described(error)}")):
         context = diagram.CreateDefaultContext()
-        diagram.get_input_port().FixValue(context, np.zeros(3))
-        begins = diagram.GetOutputPort("signals").Eval(context)
-    except PluginError:
-        raise
-    except Exception as error:  # the user's code may raise anything
-        raise PluginError(f"{about}: {described(error)}") from error
+    diagram.get_input_port().FixValue(context, np.zeros(3))
+    begins = diagram.GetOutputPort("signals").Eval(context)
     if np.abs(begins - start_m).max() > START_M:
         raise PluginError(f"{about} begins at {begins.tolist()} m; allowed: at its start, {start_m.tolist()} m")
 

@@ -3,12 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from pydrake.common.containers import namedview
 from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import Context, EventStatus, InputPort, LeafSystem, OutputPort, State, System
 
-from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, short
 from airground_drake.model.bodies.kinds import Kind
 from airground_drake.model.bodies.world import World
@@ -55,11 +53,6 @@ def components_of(world: World, *kinds: Kind) -> slice:
     """Slice of the ports `bodies` and `team_command` that belongs to the bodies of some kinds."""
     rows = world.select(*kinds)
     return slice(3 * rows.start, 3 * rows.stop)
-
-
-def laid_out(view: Any, rows: list[list[float]]) -> Array:
-    """Named vectors of all UGVs, one row each, flattened for a port."""
-    return np.array(rows, dtype=np.float64).reshape(-1, len(view.get_fields())).ravel()
 
 
 def no_proposals(count: int) -> AbstractValue:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.edits import with_cells
 from builders.worlds import beside_a_wall
 from hypothesis import given
 from hypothesis import strategies as st
@@ -276,9 +277,7 @@ def test_a_run_that_goes_backwards_breaks_the_hypothesis_that_it_does_not() -> N
 )
 def test_a_body_that_does_not_follow_its_plant_is_an_error(plant: str, column: str) -> None:
     trace = run_of(plant, "duration_s=1.0")
-    states = trace.states.copy()
-    states.loc[7, column] += 1e-6
-    (verdict,) = judge(replace(trace, states=states), ["SAFE-TRACE"])
+    (verdict,) = judge(with_cells(trace, "states", 7, column, lambda value: value + 1e-6), ["SAFE-TRACE"])
     assert verdict.status == "error"
 
 

@@ -43,4 +43,4 @@ def test_bad_parameters_are_refused(bad: float) -> None:
 
 
 S, I, R = Mode  # noqa: E741
-TRIGGER, BARE = Trigger(zeta=3.0, release=1.5, dwell=1.0), Trigger.bare(3.0)
+TRIGGER, BARE = Trigger(zeta=3.0, release=1.5, dwell=1.0), Trigger(3.0, 3.0, 0.0)

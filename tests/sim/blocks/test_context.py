@@ -6,36 +6,17 @@ from typing import Any
 
 import msgpack
 import pytest
-from pydrake.common import RandomGenerator
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.framework import Context
+from sim.blocks.contexts import advanced, begun
 
 from airground_drake.report.view.draw import robot_path, served
 from airground_drake.report.view.live_view import LiveView
 from airground_drake.scenario.load import load
-from airground_drake.sim.blocks.decision import ACCURACY
 from airground_drake.sim.diagram import RECORDED, Model, build_model
 from airground_drake.sim.simulation import Recorder
 
 HALF_S, END_S = 15.0, 18.0
 """Case A triggers at 14.48 s: at half time a proposal is being executed and watched."""
-
-
-def begun(diagram: Diagram, seed: int) -> Context:
-    context = diagram.CreateDefaultContext()
-    diagram.SetRandomContext(context, RandomGenerator(seed))
-    context.SetAccuracy(ACCURACY)
-    return context
-
-
-def advanced(diagram: Diagram, context: Context, until: float) -> Simulator:
-    simulator = Simulator(diagram, context)
-    euler = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=0.05, use_error_control=False)
-    euler.start_time = context.get_time()  # else the Context is set to 0 s
-    ApplySimulatorConfig(euler, simulator)
-    simulator.Initialize()
-    simulator.AdvanceTo(until)
-    return simulator
 
 
 def ends(model: Model, context: Context) -> list[Any]:

@@ -28,22 +28,18 @@ def moves_uav(given: dict[str, Array]) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("does", "error", "said"),
+    ("does", "said"),
     [
-        (moves_ugvs, PluginError, r"^the UAV's task Odd raised .*read-only"),
-        (moves_uav, PluginError, r"^the UAV's task Odd raised .*read-only"),
+        (moves_ugvs, r"raised .*read-only"),
+        (moves_uav, r"raised .*read-only"),
         *(
-            (
-                lambda _, asked=asked: asked,
-                PluginError,
-                r"^the UAV's task Odd asks for .*; wanted: \(1, 3\)",
-            )
+            (lambda _, asked=asked: asked, r"asks for .*; wanted: \(1, 3\)")
             for asked in (np.full((1, 3), np.nan), [[0.0, np.inf, 0.0]], np.zeros((2, 3)), "up", None)
         ),
     ],
 )
 def test_a_task_that_asks_for_no_velocity_or_moves_robots_is_stopped(
-    does: Callable[[dict[str, Array]], Any], error: type[Exception], said: str
+    does: Callable[[dict[str, Array]], Any], said: str
 ) -> None:
     """The avoidance above the task looks at the same positions."""
 
@@ -57,7 +53,7 @@ def test_a_task_that_asks_for_no_velocity_or_moves_robots_is_stopped(
 
     case_a = load("case_a")
     controller = UavController(make_world(case_a), make_avoidance(case_a), gain=1.0, altitude=2.0, task=Odd)
-    with pytest.raises(error, match=said):
+    with pytest.raises(PluginError, match=rf"^the UAV's task Odd {said}"):
         controller.velocity(0.0, np.zeros((3, 3)), np.zeros((2, 3)))
 
 

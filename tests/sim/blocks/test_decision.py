@@ -136,7 +136,7 @@ def test_a_context_without_an_accuracy_is_refused_before_the_run() -> None:
 def test_a_dip_too_short_to_be_isolated_is_a_release_and_a_trigger_at_once() -> None:
     """Below the threshold for less than what an event is isolated to: both transitions are made at the step's end."""
     nearest = 3.0 - 1e-13  # x is below 3 m for 2e-10 s
-    status = run(Trigger.bare(3.0), straight((4e3, nearest, 0.0), (-4e3, nearest, 0.0)), 1.0)
+    status = run(Trigger(3.0, 3.0, 0.0), straight((4e3, nearest, 0.0), (-4e3, nearest, 0.0)), 1.0)
     released = times(status, 3)
     assert released == [pytest.approx(0.5, abs=2e-6)]
     assert times(status, 2) == [0.0, *released]
@@ -160,7 +160,7 @@ def test_two_ugvs_at_nearly_the_same_instant(late: float) -> None:
 
 
 def test_a_bare_trigger_that_starts_at_the_threshold_lasts_while_x_stays_there_and_ends_when_it_falls() -> None:
-    bare = Trigger.bare(3.0)
+    bare = Trigger(3.0, 3.0, 0.0)
     resting = run(bare, straight((3.0, 0.0, 0.0), (3.0, 0.0, 0.0)), 0.25)
     assert (times(resting, 2), times(resting, 3)) == ([0.0], [])
     falling = run(bare, straight((3.0, 0.0, 0.0), (2.0, 0.0, 0.0)), 0.25)

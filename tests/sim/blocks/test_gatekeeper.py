@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from builders.problems import random_problem
-from pydrake.common import RandomGenerator
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from sim.blocks.contexts import begun
 from ugv.oracles import Enumeration
 
 from airground_drake.base.errors import PluginError, SimulationError
@@ -21,7 +21,8 @@ from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import DirectAcceptance, InterventionPlanner
 from airground_drake.sim.diagram import build_model
-from airground_drake.sim.simulation import Recorder, simulate
+from airground_drake.sim.simulation import simulate
+from airground_drake.sim.trace import Trace
 from airground_drake.study.testing.plugin import Simulations
 from airground_drake.uav.messages import Report
 from airground_drake.ugv import mpc_gatekeeper
@@ -44,11 +45,17 @@ class Alternating:
         return Solution(bool(self.calls % 2), "optimal", objective=least)
 
 
+def under_c(case_a: Scenario, route: type, until_s: float) -> Trace:
+    """A run whose gatekeepers decide by this route."""
+    case_a.gatekeeper.route, case_a.duration_s = "of_the_test", until_s
+    with ROUTES.adding("of_the_test", route):
+        return simulate(case_a, "c")
+
+
 @pytest.mark.parametrize("dwell", [0.0, 1.0])
 def test_opposite_answers_of_a_run_are_a_dwell_apart(case_a: Scenario, dwell: float) -> None:
-    case_a.gatekeeper.min_dwell_s, case_a.gatekeeper.route, case_a.duration_s = dwell, "alternating", 20.0
-    with ROUTES.adding("alternating", Alternating):
-        decisions = simulate(case_a, "c").decisions
+    case_a.gatekeeper.min_dwell_s = dwell
+    decisions = under_c(case_a, Alternating, 20.0).decisions
     for _, of_one in decisions.groupby(["robot", "issued_s"]):
         changes = of_one["t_s"][of_one["decision"] != of_one["decision"].shift()].to_numpy()
         assert (changes[1:] - changes[:-1] >= dwell - 1e-9).all()
@@ -88,20 +95,12 @@ class Exiting(Writing):
 
 @pytest.mark.parametrize("route", [Writing, Unlocking, Exiting])
 def test_a_route_that_writes_into_its_problem_is_named(case_a: Scenario, route: type) -> None:
-    case_a.gatekeeper.route, case_a.duration_s = "hostile", 16.0
-    with (
-        ROUTES.adding("hostile", route),
-        pytest.raises(SimulationError, match=rf"route {route.__name__} raised"),
-    ):
-        simulate(case_a, "c")
+    with pytest.raises(SimulationError, match=rf"route {route.__name__} raised"):
+        under_c(case_a, route, 16.0)
 
 
 def test_a_route_cannot_change_the_problem_that_is_recorded(case_a: Scenario, run: Simulations) -> None:
-    case_a.duration_s = 16.0
-    honest = run("case_a", "c").problems
-    case_a.gatekeeper.route = "hostile"
-    with ROUTES.adding("hostile", Exchanging):
-        trace = simulate(case_a, "c")
+    honest, trace = run("case_a", "c").problems, under_c(case_a, Exchanging, 16.0)
     assert any(honest["accept_m_s"][0])
     assert [*trace.problems["accept_m_s"][0]] == [*honest["accept_m_s"][0]]
     (verdict,) = judge(trace, ["GATE-PLAN"])
@@ -126,10 +125,8 @@ class FailingLater:
 
 def test_a_failing_solver_withdraws_no_acceptance_and_is_recorded(case_a: Scenario, run: Simulations) -> None:
     well = run("case_a", "c").decisions
-    case_a.gatekeeper.route, case_a.duration_s = "failing", 17.0
-    with ROUTES.adding("failing", FailingLater):
-        trace = simulate(case_a, "c")
-        verdicts = judge(trace, ["GATE-PLAN"])
+    trace = under_c(case_a, FailingLater, 17.0)
+    verdicts = judge(trace, ["GATE-PLAN"])
     decisions = trace.decisions
     failed = decisions[decisions["status"] == "solver_failed"]
     assert len(failed) == len(decisions) // 2 > 10
@@ -158,9 +155,7 @@ def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, mo
         return after_failure(problem, solution)
 
     monkeypatch.setattr(mpc_gatekeeper, "after_failure", listening)
-    case_a.gatekeeper.route, case_a.duration_s = "failing", 17.0
-    with ROUTES.adding("failing", Listening):
-        simulate(case_a, "c")
+    under_c(case_a, Listening, 17.0)
     plans = [solution.plan for solution in solutions if solution.plan is not None]
     assert len(before) > 10
     for plan, rest in zip(plans, before, strict=False):
@@ -191,10 +186,7 @@ def test_gains_changed_in_a_context_count_in_the_prediction(run: str) -> None:
     for changed in (True, False):
         scenario = load("case_b", () if changed else [f"control.{name}={value}" for name, value in gains.items()])
         model = build_model(scenario, scenario.runs[run].method, disturbed=False)
-        simulator = Simulator(model.diagram)
-        context = simulator.get_mutable_context()
-        context.SetAccuracy(1e-6)
-        model.diagram.SetRandomContext(context, RandomGenerator(1))
+        simulator = Simulator(model.diagram, context := begun(model.diagram, 1))
         for controller in model.controllers if changed else ():
             view = controller.mutable_gains(controller.GetMyMutableContextFromRoot(context))
             for name in set(gains) & set(view.get_fields()):
@@ -263,11 +255,10 @@ def test_a_decision_has_counts_in_simulation_and_half_the_sampling_period_in_rea
             return Solution(False, "refused_not_finite")
 
     gate = case_a.gatekeeper
-    gate.budget_iterations, gate.budget, gate.route = 7, kind, "watching"
+    gate.budget_iterations, gate.budget = 7, kind
     if kind == "wall_clock":
         timed(monkeypatch, clock)
-    with ROUTES.adding("watching", Watching):
-        Recorder(case_a, "c").simulate(duration=16.0)
+    under_c(case_a, Watching, 16.0)
     begins = [0.001 * (k + 1) for k in range(len(budgets))]  # read once a sample: one proposal each
     deadlines = [math.inf if kind == "counted" else begin + 0.025 for begin in begins]
     assert begins

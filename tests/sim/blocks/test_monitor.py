@@ -4,17 +4,16 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from pydrake.common import RandomGenerator
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
+from sim.blocks.contexts import begun
 
 from airground_drake.scenario.load import load
 from airground_drake.scenario.schema import Scenario
 from airground_drake.scenario.world import make_world
 from airground_drake.sim import components
 from airground_drake.sim.blocks import Monitor, Rule, Violation
-from airground_drake.sim.blocks.decision import ACCURACY
 from airground_drake.sim.diagram import build_diagram, make_monitor
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge
@@ -25,10 +24,7 @@ def watched(
 ) -> tuple[Violation | None, SimulatorStatus]:
     monitor = make_monitor(honest or scenario, method, terminate=terminate)
     diagram = build_diagram(scenario, method, monitor=monitor)
-    context = diagram.CreateDefaultContext()
-    diagram.SetRandomContext(context, RandomGenerator(scenario.seed))
-    context.SetAccuracy(ACCURACY)
-    simulator = Simulator(diagram, context)
+    simulator = Simulator(diagram, context := begun(diagram, scenario.seed))
     simulator.Initialize()
     status = simulator.AdvanceTo(scenario.duration_s)
     found = monitor.violation(monitor.GetMyContextFromRoot(context))

@@ -5,13 +5,15 @@ from functools import cache
 from itertools import permutations
 from typing import Any
 
+import maps
 import numpy as np
 import pytest
+from builders.edits import with_cells
 from hypothesis import given
 from hypothesis import strategies as st
 from oracles import ORACLES, faults_of
 from properties import examples
-from sim.blocks.test_positions import ABOUT_D, APART_M, PERIOD_S, checked, forged, found, least_m, team
+from sim.blocks.test_positions import ABOUT_D, APART_M, PERIOD_S, checked, found, least_m, team
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, ScenarioError
@@ -117,7 +119,7 @@ def test_a_position_that_is_older_than_it_was_is_found() -> None:
 def test_a_position_of_no_sample_so_far_is_found() -> None:
     trace = run(0, 0.1, 0.5)
     for value in (1e9, 0.5 * PERIOD_S, -1.0):
-        wrong = forged(trace, "ugv1.heard_ugv2_s", value, 20)
+        wrong = with_cells(trace, "samples", 20, "ugv1.heard_ugv2_s", value)
         assert found(wrong, "SAFE-HYP") == {"SAFE-HYP": "refuted"}
         ours = safety.safe_hyp(checked(wrong))
         assert ours.because is not None
@@ -127,7 +129,7 @@ def test_a_position_of_no_sample_so_far_is_found() -> None:
 def test_a_position_of_no_sample_is_found_of_far_ugvs_too() -> None:
     far = simulate(old_team(0, 0.1, 0.5, {"duration_s": 1.0}), "a")
     for first, second in permutations(far.ugvs, 2):
-        wrong = forged(far, f"{first}.heard_{second}_s", 1e9, 10)
+        wrong = with_cells(far, "samples", 10, f"{first}.heard_{second}_s", 1e9)
         assert found(wrong, "SAFE-HYP") == {"SAFE-HYP": "refuted"}
 
 
@@ -214,12 +216,9 @@ def test_the_budget_is_about_positions_that_may_be_lacking(
 def test_rounding_far_from_the_origin_adds_nothing_up() -> None:
     """Two that follow each other, 2 km away, each as near as it may be for most of the run."""
     data = resolved(old_team(0, 0.3, 0.0))
-    ugv = {"max_speed_m_s": 1.0, "radius_m": 0.0}
     for name, behind, speed in (("ugv1", 1.0, 0.5), ("ugv2", 3.0, 1.0)):
-        ends = [[2000.0 - behind, 2000.0, 0.0], [2020.0 - behind, 2000.0, 0.0]]
-        preset = {"waypoints_m": ends, "speed_m_s": speed}
-        ugv_data = ugv | {"start_m": ends[0], "target_m": ends[1], "preset": preset}
-        data["ugvs"][name] = data["ugvs"][name] | ugv_data
+        ends = (2000.0 - behind, 2000.0), (2020.0 - behind, 2000.0)
+        data["ugvs"][name] |= maps.straight(*ends, speed, max_speed_m_s=1.0, radius_m=0.0)
     data["ugvs"] = {name: data["ugvs"][name] for name in ("ugv1", "ugv2")}
     data |= {"obstacles": {}, "runs": {"a": {"method": "a"}}, "duration_s": 20.0}
     data["uav"] |= {"start_m": [2000.0, 2000.0, 3.0], "target_m": [2018.0, 2000.0, 3.0]}

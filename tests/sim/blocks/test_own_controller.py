@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource
+from sim.blocks.both_programs import found
 
 from airground_drake.base.errors import PluginError, ScenarioError, SimulationError
 from airground_drake.model.bodies.world import World
@@ -17,7 +18,6 @@ from airground_drake.scenario.load import load, resolved
 from airground_drake.sim.blocks import UgvController
 from airground_drake.sim.diagram import build_diagram, make_monitor
 from airground_drake.sim.simulation import simulate
-from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge, judge_model
 
 SETTINGS = {"duration_s": 5.0}
@@ -117,10 +117,6 @@ class NoMap(Straight):
         raise FileNotFoundError("no map")
 
 
-def statuses(trace: Trace) -> dict[str, str]:
-    return {verdict.claim.id: verdict.status for verdict in judge(trace)}
-
-
 def test_the_packages_own_as_a_users_makes_the_same_run_but_no_claim_is_made_about_a_law() -> None:
     scenario = load("minimal", SETTINGS)
     usual, own = simulate(scenario, "d"), simulate(scenario, "d", ugv_controller=UgvController, engine="batch")
@@ -129,28 +125,28 @@ def test_the_packages_own_as_a_users_makes_the_same_run_but_no_claim_is_made_abo
     kind = "airground_drake.sim.blocks.controllers:UgvController"
     assert own.meta["controllers"]["ugv_controller"] == {"class": kind, "sampling_s": [0.025, 0.0]}
     assert own.scenario.ugv_controller is not None
-    found = {verdict.claim.id: verdict for verdict in judge(own)}
-    assert {found[claim].status for claim in ("SAFE-TRACE", "SAFE-HYP")} == {"holds"}
+    verdicts = {verdict.claim.id: verdict for verdict in judge(own)}
+    assert {verdicts[claim].status for claim in ("SAFE-TRACE", "SAFE-HYP")} == {"holds"}
     for claim in ("GATE-PLAN", "LIVE-HYP"):
-        assert (found[claim].status, found[claim].as_expected) == ("not_run", True)
-        assert kind in found[claim].evidence["reason"]
-    assert "not by what it was built with" in found["SAFE-HYP"].evidence["own_controller"]
+        assert (verdicts[claim].status, verdicts[claim].as_expected) == ("not_run", True)
+        assert kind in verdicts[claim].evidence["reason"]
+    assert "not by what it was built with" in verdicts["SAFE-HYP"].evidence["own_controller"]
     about = {verdict.claim.id: verdict for verdict in judge_model(own.scenario, claims=["SAFE-GATE", "SAFE-INV"])}
     assert about["SAFE-GATE"].status == "not_run"
     assert about["SAFE-INV"].status == "proved"
-    assert {statuses(usual)[claim] for claim in ("GATE-PLAN", "LIVE-HYP")} == {"holds"}
+    assert set(found(usual, "GATE-PLAN", "LIVE-HYP").values()) == {"holds"}
 
 
 def test_steps_that_miss_the_inequalities_are_found() -> None:
-    found = statuses(simulate(load("swap"), "a", ugv_controller=Straight))
-    assert (found["SAFE-TRACE"], found["SAFE-HYP"]) == ("refuted", "refuted")
+    trace = simulate(load("swap"), "a", ugv_controller=Straight)
+    assert found(trace, "SAFE-TRACE", "SAFE-HYP") == {"SAFE-TRACE": "refuted", "SAFE-HYP": "refuted"}
 
 
 def test_a_class_that_the_scenario_does_not_name_does_not_pass_for_a_controller() -> None:
     usual = simulate(load("minimal", SETTINGS), "d")
     own = usual.meta["controllers"] | {"ugv_controller": {"class": "m:C", "sampling_s": [0.025, 0.0]}}
     forged = replace(usual, meta=usual.meta | {"controllers": own})
-    assert (statuses(forged)["SAFE-HYP"], statuses(forged)["LIVE-HYP"]) == ("error", "holds")
+    assert found(forged, "SAFE-HYP", "LIVE-HYP") == {"SAFE-HYP": "error", "LIVE-HYP": "holds"}
 
 
 @pytest.mark.parametrize(

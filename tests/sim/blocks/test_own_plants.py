@@ -1,24 +1,25 @@
 """Users' plants: Drake Systems with a declared drift and cover, which each run measures."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from builders.edits import with_cells
 from pydrake.systems.framework import BasicVector, Diagram, DiagramBuilder, LeafSystem, System
 from pydrake.systems.primitives import LinearSystem
+from sim.blocks.both_programs import checked, found
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import PluginError, ScenarioError, SimulationError
 from airground_drake.check import safety
 from airground_drake.check.rules import Disagreement
-from airground_drake.check.run import Run, _moves_as_commanded
+from airground_drake.check.run import _moves_as_commanded
 from airground_drake.model.plants.budget import Bounds, law_distance
 from airground_drake.scenario import plugins
-from airground_drake.scenario.load import load, resolved
+from airground_drake.scenario.load import load
 from airground_drake.sim.blocks.plant import OwnPlant
 from airground_drake.sim.diagram import build_diagram
 from airground_drake.sim.simulation import simulate
@@ -126,10 +127,6 @@ def of(make: Callable[..., System], drift_m_s: float = 0.0, cover_m: float = 0.0
     return simulate(load("minimal", SETTINGS), "d", plants={"ugv1": OwnPlant(make, drift_m_s, cover_m, parameters)})
 
 
-def statuses(trace: Trace, *claims: str) -> dict[str, str]:
-    return {each.claim.id: each.status for each in judge(trace, claims or None)}
-
-
 def broken(trace: Trace) -> str:
     """The hypothesis of SAFE-HYP that a run breaks."""
     (verdict,) = judge(trace, ["SAFE-HYP"])
@@ -141,7 +138,7 @@ def test_a_robot_that_obeys_runs_as_one_of_first_order() -> None:
     at = np.searchsorted(own.t, plain.t - 1e-9)
     assert np.abs(own.position("ugv1")[at] - plain.position("ugv1")).max() < 1e-6  # as events are isolated
     assert [event["kind"] for event in own.events] == [event["kind"] for event in plain.events]
-    assert set(statuses(own).values()) == {"holds"}
+    assert set(found(own).values()) == {"holds"}
     assert own.sampled("ugv1.drift_m_s").max() < 1e-9
     assert own.sampled("ugv1.cover_m").max() < 1e-9
 
@@ -153,7 +150,7 @@ def test_drift_and_cover_are_those_of_the_motion() -> None:
         0.1 * np.linalg.norm(trace.chosen("ugv1"), axis=1), abs=1e-9
     )
     assert trace.sampled("ugv1.cover_m").max() < 1e-9
-    assert set(statuses(trace).values()) == {"holds"}
+    assert set(found(trace).values()) == {"holds"}
     most = float(trace.sampled("ugv1.drift_m_s").max())
     assert broken(of(Robot, drift_m_s=0.9 * most, share=0.9)) == "declared drift"
 
@@ -164,7 +161,7 @@ def test_a_body_apart_from_the_steered_point_is_covered() -> None:
     speed = np.linalg.norm(trace.position("ugv1") - trace.body("ugv1"), axis=1)
     assert trace.sampled("ugv1.drift_m_s").max() < 1e-6
     assert trace.sampled("ugv1.cover_m").max() == pytest.approx(speed.max(), abs=1e-9)
-    assert set(statuses(trace).values()) == {"holds"}
+    assert set(found(trace).values()) == {"holds"}
     assert broken(of(Lagging, drift_m_s=1e-5, cover_m=0.05)) == "declared cover"
 
 
@@ -194,7 +191,7 @@ def test_a_plant_that_jumps_is_passed_on_as_going_straight_one_of_its_steps_late
     """So no trigger is late, and the trace is continuous; the robot need not start at the origin."""
     scenario = load("minimal", {**SETTINGS, "ugvs.ugv1.start_m": [0.5, 0.3, 0.0]})
     trace = simulate(scenario, "d", plants={"ugv1": OwnPlant(stepping, 1.2, 0.03, {"step_s": 0.005})})
-    assert set(statuses(trace).values()) == {"holds"}
+    assert set(found(trace).values()) == {"holds"}
     place, command = trace.position("ugv1"), trace.command("ugv1")
     assert place[0].tolist() == [0.5, 0.3, 0.0]
     late = trace.t - 0.005
@@ -212,12 +209,12 @@ def test_beside_somebody_who_walks_both_programs_say_the_same(declared: float, w
     settings = {**SETTINGS, "obstacles.rock": PERSON, "safe_distance.moving_m": 1.0, "ugvs.ugv1.max_speed_m_s": 2.0}
     plants = {"ugv1": OwnPlant(Robot, declared, 0.0, {"wind_m_s": wind})}
     trace = simulate(load("minimal", settings), "a", plants=plants)
-    found = statuses(trace, "SAFE-TRACE", "SAFE-OWN", "SAFE-HYP")
+    theirs = found(trace, "SAFE-TRACE", "SAFE-OWN", "SAFE-HYP")
     promised = "holds" if declared >= 0.3 else "refuted"
-    assert found == {"SAFE-TRACE": "holds", "SAFE-OWN": promised, "SAFE-HYP": promised}
-    run = replace(checked(trace), name="a")
+    assert theirs == {"SAFE-TRACE": "holds", "SAFE-OWN": promised, "SAFE-HYP": promised}
+    run = checked(trace)
     ours = (safety.safe_trace(run), safety.safe_own(run), safety.safe_hyp(run))
-    assert [each.status for each in ours if each] == [*found.values()]
+    assert [each.status for each in ours if each] == [*theirs.values()]
     (own,) = judge(trace, ["SAFE-OWN"])
     assert ours[1] is not None
     assert (ours[1].margin or 0.0) == pytest.approx(own.margin or 0.0, abs=1e-9)
@@ -228,11 +225,6 @@ def test_the_theorem_is_about_the_declared_numbers() -> None:
     (verdict,) = judge_model(of(Robot, drift_m_s=0.3, cover_m=0.1).scenario, claims=["SAFE-BUDGET"])
     assert verdict.status == "proved"
     assert "Mixed.drifting" in verdict.evidence["theorems"]
-
-
-def checked(trace: Trace, samples: Any = None, states: Any = None) -> Run:
-    given = trace.states if states is None else states, trace.samples if samples is None else samples
-    return Run("d", resolved(trace.scenario), trace.events, *given)
 
 
 def test_the_checker_comes_to_the_same_verdicts() -> None:
@@ -252,11 +244,11 @@ def test_the_checker_comes_to_the_same_verdicts() -> None:
 )
 def test_a_forged_record_is_found(table: str, column: str) -> None:
     trace = of(Lagging, drift_m_s=1e-5, cover_m=LAG_S * 6.0)
-    forged = getattr(trace, table).copy()
-    forged.loc[forged.index[60], f"ugv1.{column}"] += 1.0 if table == "states" else -1e-6
-    assert statuses(replace(trace, **{table: forged}), "SAFE-TRACE") == {"SAFE-TRACE": "error"}
+    by = 1.0 if table == "states" else -1e-6
+    forged = with_cells(trace, table, 60, f"ugv1.{column}", lambda value: value + by)
+    assert found(forged, "SAFE-TRACE") == {"SAFE-TRACE": "error"}
     with pytest.raises(Disagreement, match=r"(drift|cover) of a plant"):
-        _moves_as_commanded(checked(trace, **{table: forged}), "ugv1")
+        _moves_as_commanded(checked(forged), "ugv1")
 
 
 @pytest.mark.parametrize(

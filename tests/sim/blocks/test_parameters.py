@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from pydrake.systems.framework import Context
-from sim.blocks.test_context import advanced, begun
+from sim.blocks.contexts import advanced, begun
 
 from airground_drake.scenario.load import load
 from airground_drake.sim.diagram import Model, build_model

@@ -5,8 +5,10 @@ from functools import cache
 from itertools import permutations
 from typing import Any
 
+import maps
 import numpy as np
 import pytest
+from builders.edits import with_cells
 from oracles import ORACLES, faults_of
 from sim.blocks.both_programs import broken_rules, checked, found
 
@@ -30,16 +32,13 @@ ABOUT_D = ("SAFE-TRACE", "SAFE-HYP", "LIVE-HYP", "GATE-PLAN", "THR-TRIG")
 def team(seed: int, links: dict[str, float] | None, plant: Any = None, **more: Any) -> Scenario:
     draw = np.random.default_rng(seed)
     angles = 0.5 * np.pi * np.arange(4) + draw.uniform(-0.5, 0.5, 4)
-    starts = np.round(4.0 * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles]), 3)
-    ends = np.round(-starts + np.append(draw.uniform(-0.6, 0.6, (4, 2)), np.zeros((4, 1)), axis=1), 3)
+    starts = np.round(4.0 * np.column_stack([np.cos(angles), np.sin(angles)]), 3)
+    ends = np.round(-starts + draw.uniform(-0.6, 0.6, (4, 2)), 3)
     speeds = draw.uniform(0.8, 2.0, 4).round(2)
     ugvs = {
-        f"ugv{k + 1}": {
-            "start_m": start, "target_m": end, "max_speed_m_s": speed, **({"plant": plant} if plant else {}),
-            "preset": {"waypoints_m": [start, end], "speed_m_s": 0.7 * speed},
-        }
-        for k, (start, end, speed) in enumerate(zip(starts.tolist(), ends.tolist(), speeds.tolist(), strict=True))
-    }  # fmt: skip
+        f"ugv{k}": maps.straight(*way, 0.7 * speed, max_speed_m_s=speed, **({"plant": plant} if plant else {}))
+        for k, (*way, speed) in enumerate(zip(starts, ends, speeds.tolist(), strict=True), start=1)
+    }
     rock = [*np.round(draw.uniform(-0.5, 0.5, 2), 3).tolist(), 0.0]
     data = {
         "name": "circle", "duration_s": 8.0, "ugvs": ugvs, "uav": {"start_m": [0.0, 0.0, 3.0], "altitude_m": 3.0},
@@ -140,15 +139,9 @@ def test_measured_positions_are_announced_too() -> None:
     assert not faults_of(trace)
 
 
-def forged(trace: Trace, column: str, value: Any, sample: int) -> Trace:
-    samples = trace.samples.copy()
-    samples.loc[sample, column] = value
-    return replace(trace, samples=samples)
-
-
 def test_positions_elsewhere_than_announced_are_found() -> None:
     trace = run(0, 0.0, PERIOD_S, "d")
-    moved = forged(trace, "ugv1.seen_x_m", trace.as_seen("ugv1", "ugv1")[40, 0] + 1e-6, 40)
+    moved = with_cells(trace, "samples", 40, "ugv1.seen_x_m", lambda seen: seen + 1e-6)
     assert broken_rules(moved) == 2 * ["announced position"]
 
 
@@ -160,7 +153,7 @@ def test_a_ugv_that_drives_without_a_message_of_a_near_one_is_found() -> None:
         for k in np.flatnonzero(np.linalg.norm(trace.chosen(first), axis=1) > 0.1).tolist()
         if np.linalg.norm((trace.position(first) - trace.position(second))[trace.sample_rows[k]]) < APART_M + 0.1
     )
-    unheard = forged(trace, f"{first}.heard_{second}_s", trace.sampled("t_s")[k - 1], k)
+    unheard = with_cells(trace, "samples", k, f"{first}.heard_{second}_s", trace.sampled("t_s")[k - 1])
     assert broken_rules(unheard) == 2 * ["standing without a message"]
     assert ORACLES["records"](unheard)
 

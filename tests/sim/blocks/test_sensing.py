@@ -1,12 +1,13 @@
 """Errors of measured positions: robots act on what they see, claims are about what is true, and the law pays for it."""
 
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from typing import Any
 
+import maps
 import numpy as np
 import pytest
+from builders.edits import with_cells
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
@@ -38,12 +39,12 @@ PERSON = {"radius_m": 0.25, "max_speed_m_s": 1.0, "moves": {
 
 
 def crossing(others: Any = (), **sensing: Any) -> Scenario:
-    def ugv(start: list[float], target: list[float]) -> dict[str, Any]:
-        return {"start_m": start, "target_m": target, "preset": {"waypoints_m": [start, target]}, "max_speed_m_s": 2.0}
-
     data = {
         "name": "crossing_of_two", "duration_s": 12.0,
-        "ugvs": {"ugv1": ugv([-5.0, 0.0, 0.0], [5.0, 0.0, 0.0]), "ugv2": ugv([0.0, -5.0, 0.0], [0.0, 5.0, 0.0])},
+        "ugvs": {
+            "ugv1": maps.straight((-5.0, 0.0), (5.0, 0.0), 1.0, max_speed_m_s=2.0),
+            "ugv2": maps.straight((0.0, -5.0), (0.0, 5.0), 1.0, max_speed_m_s=2.0),
+        },
         "uav": {"start_m": [-2.5, -2.5, 2.0]},
         "obstacles": {"rock": {"position_m": [2.5, 0.3, 0.0], "radius_m": 0.3}, **dict(others)},
         "safe_distance": {"obstacle_m": 0.6, "ugv_m": 0.6},
@@ -125,25 +126,24 @@ def test_robots_that_measure_each_other_pay_for_different_directions(monkeypatch
     rows = ours.period_rows(law.other)
     lacks = safety.measured_shortfall_m(ours, law, rows, Fraction(0.5 * 8.0 * 0.05), Fraction(1))
     assert float(lacks) == pytest.approx(missed, rel=1e-6)
-    samples = trace.samples.copy()
-    samples.loc[40, "uav.saw_ugv2_x_m"] = trace.position("ugv2")[trace.sample_rows[40], 0] + ERROR_M + 1e-6
-    assert broken_rules(replace(trace, samples=samples))[1] == "error of the measured position"
+    off = trace.position("ugv2")[trace.sample_rows[40], 0] + ERROR_M + 1e-6
+    forged = with_cells(trace, "samples", 40, "uav.saw_ugv2_x_m", off)
+    assert broken_rules(forged)[1] == "error of the measured position"
     (verdict,) = judge_model(scenario, claims=["SAFE-BUDGET"])
     assert (verdict.status, "Budget.own_views" in verdict.evidence["theorems"]) == ("proved", True)
-    right = vars(Body)["bounds"].fget
-    monkeypatch.setattr(Body, "bounds", property(lambda self: right(self)._replace(own_views=False)))
+    do_not_pay(monkeypatch, own_views=False)
     wrong = simulate(scenario, "a")
     assert safety.safe_hyp(checked(wrong)).status == found(wrong, "SAFE-HYP")["SAFE-HYP"] == "refuted"
 
 
-def do_not_pay(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From now on the law keeps no more than without errors."""
+def do_not_pay(monkeypatch: pytest.MonkeyPatch, **unpaid: Any) -> None:
+    """From now on the law keeps no more than without something, such as errors."""
     right = vars(Body)["bounds"].fget
-    monkeypatch.setattr(Body, "bounds", property(lambda self: right(self)._replace(error_m=0.0)))
+    monkeypatch.setattr(Body, "bounds", property(lambda self: right(self)._replace(**unpaid)))
 
 
 def test_a_law_that_does_not_pay_for_errors_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    do_not_pay(monkeypatch)
+    do_not_pay(monkeypatch, error_m=0.0)
     trace = simulate(crossing(errors="away"), "a")
     assert found(trace, "SAFE-TRACE", "SAFE-HYP") == {"SAFE-TRACE": "refuted", "SAFE-HYP": "refuted"}
     assert safety.safe_hyp(checked(trace)).status == "refuted"
@@ -163,18 +163,15 @@ def test_beside_a_person_robots_only_go_where_they_surely_get_no_nearer(
     for ours in (safety.safe_own(checked(trace)), safety.safe_hyp(checked(trace))):
         assert getattr(ours, "status", "") == "holds"
     assert [*impossible(trace, scenario)] == []
-    do_not_pay(monkeypatch)
+    do_not_pay(monkeypatch, error_m=0.0)
     wrong = simulate(scenario, "a")
     assert safety.safe_hyp(checked(wrong)).status == found(wrong, "SAFE-HYP")["SAFE-HYP"] == "refuted"
 
 
 def test_measured_positions_beyond_their_bound_are_found() -> None:
     trace = run("away")
-    samples = trace.samples.copy()
-    place = trace.position("ugv1")[trace.sample_rows[40]]
-    samples.loc[40, "ugv1.seen_x_m"] = place[0] + ERROR_M + 1e-6
-    forged = replace(trace, samples=samples)
-    assert broken_rules(forged)[1] == "error of the measured position"
+    off = trace.position("ugv1")[trace.sample_rows[40], 0] + ERROR_M + 1e-6
+    assert broken_rules(with_cells(trace, "samples", 40, "ugv1.seen_x_m", off))[1] == "error of the measured position"
 
 
 def test_the_model_says_what_the_budget_needs() -> None:
@@ -196,20 +193,17 @@ def test_without_the_key_nothing_is_written_of_it_and_the_loop_makes_the_run() -
         make_monitor(measured)
 
 
-def test_a_robot_stands_where_inequalities_contradict_one_another() -> None:
-    normal, bound = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), np.array([0.1, 0.1])
-    wish = np.array([0.5, 0.5, 0.0])
-    assert not kernels.avoid_one(wish, normal, bound, kernels.STANDING, np.inf).any()
-    assert kernels.avoid_one(wish, normal, bound - 0.2, kernels.STANDING, np.inf).tolist() == pytest.approx(
-        [0.1, 0.5, 0.0]
-    )
-
-
-def test_a_robot_stands_where_inequalities_ask_for_more_than_its_speed_limit() -> None:
-    normal, bound = np.array([[1.0, 0.1, 0.0], [-1.0, 0.1, 0.0]]), np.array([0.1, 0.1])  # both: 1 m/s along y
-    wish = np.array([0.5, 0.5, 0.0])
-    assert kernels.avoid_one(wish, normal, bound, kernels.STANDING, 1.1)[1] == pytest.approx(1.0)
-    assert not kernels.avoid_one(wish, normal, bound, kernels.STANDING, 0.9).any()
+@pytest.mark.parametrize(
+    ("y", "bound", "limit", "velocity"),
+    [(0.0, -0.1, np.inf, [0.1, 0.5]), (0.0, 0.1, np.inf, []), (0.1, 0.1, 1.1, [0.0, 1.0]), (0.1, 0.1, 0.9, [])],
+)
+def test_a_robot_stands_where_inequalities_contradict_each_other_or_ask_for_more_than_its_speed_limit(
+    y: float, bound: float, limit: float, velocity: list[float]
+) -> None:
+    """Both ask for 0.1 m/s to opposite sides, which y = 0.1 allows from 1 m/s along y on; [] stands for standing."""
+    wish, normal = np.array([0.5, 0.5, 0.0]), np.array([[1.0, y, 0.0], [-1.0, y, 0.0]])
+    found = kernels.avoid_one(wish, normal, np.full(2, bound), kernels.STANDING, limit)
+    assert found[:2].tolist() == pytest.approx(velocity) if velocity else not found.any()
 
 
 def any_bounds() -> st.SearchStrategy[Bounds]:

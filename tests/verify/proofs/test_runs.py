@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders.edits import with_scenario
+from builders.edits import with_cells, with_scenario
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
@@ -55,9 +55,7 @@ def test_case_a_keeps_its_distances_and_obeys_the_law(run: Simulations, workshop
 
 
 def moved(of: Trace, row: int, place: Array) -> Trace:
-    table = of.states.copy()
-    table.loc[row, [f"{UGV}.{axis}_m" for axis in "xyz"]] = place
-    return replace(of, states=table)
+    return with_cells(of, "states", row, [f"{UGV}.{axis}_m" for axis in "xyz"], place)
 
 
 NEAREST = 10

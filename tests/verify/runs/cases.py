@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from builders.decisions import STAGES
-from builders.edits import first_of, with_decision, with_meta, with_samples, with_scenario
+from builders.edits import first_of, with_decision, with_meta, with_scenario, with_table
 from builders.runs import beside_a_rock, chattering, dead_end, leaking, refractory, run_of
 
 from airground_drake.sim.trace import Trace
@@ -36,7 +36,7 @@ def meta(**changes: Any) -> Edit:
 
 
 def sampled(**columns: Any) -> Edit:
-    return lambda trace: with_samples(trace, lambda table: table.assign(**columns))
+    return lambda trace: with_table(trace, "samples", lambda table: table.assign(**columns))
 
 
 def events(edit: Callable[[list[dict[str, Any]]], object]) -> Edit:

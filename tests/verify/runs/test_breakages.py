@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.decisions import STAGES
-from builders.edits import bumped, first_of, moved, rows, with_decision, with_scenario
+from builders.edits import bumped, first_of, moved, rows, with_cells, with_decision, with_scenario
 from verify.judging import CLAIMS
 from verify.runs.cases import (
     B_C,
@@ -73,9 +73,8 @@ def without_decisions(trace: Trace) -> Trace:
 
 def alternating(trace: Trace) -> Trace:
     """Every other answer on an accepted proposal is a refusal."""
-    table = trace.decisions.copy()
-    table.loc[np.flatnonzero(executing(table))[::2], "decision"] = "refuse"
-    return replace(with_scenario(trace, gatekeeper__tries=2), decisions=table)
+    answers = np.flatnonzero(executing(trace.decisions))[::2]
+    return with_cells(with_scenario(trace, gatekeeper__tries=2), "decisions", answers, "decision", "refuse")
 
 
 def stall(y: float) -> dict[str, list[float]]:

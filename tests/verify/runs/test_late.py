@@ -4,8 +4,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import maps
 import numpy as np
 import pytest
+from builders.edits import with_cells
 from promises import judged
 
 from airground_drake.model.plants.budget import AT_REST, Bounds, kept_distance, law_distance
@@ -22,11 +24,8 @@ PERSON = {"radius_m": 0.05, "moves": {"waypoints_m": [[1.2, -3.0], [1.2, 0.0]], 
 
 
 def beside(obstacle: dict[str, Any], plant: Any, *, speed: float = 2.0, radius: float = 0.1, **safe: float) -> Trace:
-    start, target = [0.0, 0.0, 0.0], [8.0, 0.0, 0.0]
-    ugv = {
-        "start_m": start, "target_m": target, "preset": {"waypoints_m": [start, target], "speed_m_s": speed},
-        "max_speed_m_s": speed if speed < 1.0 else 2.5, "radius_m": radius, "plant": plant,
-    }  # fmt: skip
+    limit = speed if speed < 1.0 else 2.5
+    ugv = maps.straight((0.0, 0.0), (8.0, 0.0), speed, max_speed_m_s=limit, radius_m=radius, plant=plant)
     data = {
         "name": "late", "duration_s": 6.0, "ugvs": {"u1": ugv}, "obstacles": {"rock": obstacle},
         "uav": {"start_m": [0.0, 20.0, 4.0], "target_m": [8.0, 20.0, 4.0], "altitude_m": 4.0},
@@ -128,13 +127,8 @@ def test_one_turn_above_a_limit_breaks_that_hypothesis_alone(name: str) -> None:
     plant, rate_rad_s = LIMITS[name]
     trace = plain(plant)
     assert not broken(trace)
-    states, row, h = trace.states.copy(), trace.sample_rows[50], trace.scenario.control.period_s
-    heading = states["ugv1.heading_rad"].to_numpy(copy=True)
-    later = np.arange(len(heading)) >= trace.sample_rows[51]
-    heading[later] += rate_rad_s * h
-    states["ugv1.heading_rad"] = heading
-    assert row < trace.sample_rows[51]
-    assert broken(replace(trace, states=states)) == {name}
+    later, turn = trace.t >= trace.t[trace.sample_rows[51]], rate_rad_s * trace.scenario.control.period_s
+    assert broken(with_cells(trace, "states", later, "ugv1.heading_rad", lambda value: value + turn)) == {name}
 
 
 EDITS: dict[str, tuple[str, Callable[[Any, Any], None]]] = {
@@ -162,9 +156,7 @@ def test_one_recorded_signal_breaks_its_hypothesis_alone(name: str) -> None:
 def test_a_steered_point_off_its_line_breaks_straight_motion_alone() -> None:
     trace = plain("{kind: first_order}", "decision.noise_m_sqrt_s=0.001", "decision.noise_period_s=0.0125")
     row = int(np.setdiff1d(np.arange(len(trace.t)), trace.sample_rows)[20])
-    states = trace.states.copy()
-    states.loc[row, "ugv1.y_m"] += 1e-6
-    assert broken(replace(trace, states=states)) == {"straight motion"}
+    assert broken(with_cells(trace, "states", row, "ugv1.y_m", lambda y_m: y_m + 1e-6)) == {"straight motion"}
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import persons
 import pytest
-from builders.edits import with_scenario, with_states
+from builders.edits import with_scenario, with_table
 from persons import RADII, D, H
 from verify.judging import decided
 
@@ -34,7 +34,7 @@ def placed(trace: Trace, places: Array) -> Trace:
         for k, axis in enumerate("xyz"):
             states[f"person.{axis}_m"] = places[:, k]
 
-    return with_states(trace, edit)
+    return with_table(trace, "states", edit)
 
 
 def test_a_person_who_walks_through_a_robot_is_named_and_the_robot_is_not() -> None:

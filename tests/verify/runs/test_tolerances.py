@@ -1,13 +1,12 @@
 """For each claim about a run: a record changed by twice its tolerance is refuted, and by half of it holds."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import persons
 import pytest
-from builders.edits import bumped, moved, with_decision, with_events, with_scenario, with_states
+from builders.edits import bumped, moved, with_cells, with_decision, with_events, with_scenario
 from builders.layout import rebuilt
 from builders.runs import beside_a_rock
 from builders.scenarios import STILL, lone
@@ -70,16 +69,13 @@ def triggered_later(trace: Trace, by: float) -> Trace:
         trace, lambda every: [{**e, "t_s": e["t_s"] + by} if e["kind"] == "trigger" else e for e in every]
     )
     name = "ugv1.triggered_at_s"
-    return with_states(shifted, lambda table: table.assign(**{name: table[name] + by * (table[name] >= 0.0)}))
+    return with_cells(shifted, "states", shifted.states[name] >= 0.0, name, lambda value: value + by)
 
 
 def column(name: str, unit: Callable[[Trace], float] = lambda trace: 1.0) -> Edit:
-    def edit(trace: Trace, by: float) -> Trace:
-        decisions = trace.decisions.copy()
-        decisions.loc[len(decisions) - 1, name] += by * unit(trace)
-        return replace(trace, decisions=decisions)
-
-    return edit
+    return lambda trace, by: with_cells(
+        trace, "decisions", len(trace.decisions) - 1, name, lambda value: value + by * unit(trace)
+    )
 
 
 def array(name: str, index: Any, *, relative: bool = False) -> Edit:
@@ -129,10 +125,10 @@ def stops_farther(trace: Trace, by: float) -> Trace:
 
 def dearer_stop(trace: Trace, by: float) -> Trace:
     """A choice that stops short of the goal costs more than the way left, by so many tolerances."""
-    given, decisions = trace.decisions.iloc[0], trace.decisions.copy()
+    given = trace.decisions.iloc[0]
     ahead = given["refuse_left_m"] ** 3 / 3.0 / trace.scenario.ugvs[given["robot"]].preset.speed_m_s
-    decisions.loc[0, ["refuse_stalls", "refuse_outcome_m2_s"]] = 1.0, ahead + by * cost_tolerance(ahead)
-    return replace(trace, decisions=decisions)
+    values = [1.0, ahead + by * cost_tolerance(ahead)]
+    return with_cells(trace, "decisions", 0, ["refuse_stalls", "refuse_outcome_m2_s"], values)
 
 
 def signal(name: str, row: int | Callable[[Trace], int]) -> Edit:

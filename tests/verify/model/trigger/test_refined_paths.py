@@ -33,7 +33,7 @@ def test_expected_bare_count_against_random_walks(leak: float) -> None:
 
 @given(
     st.lists(st.floats(0.0, 6.0), min_size=3, max_size=40),
-    st.sampled_from([Trigger(3.0, 2.0, 0.5), Trigger(3.0, 3.0, 0.5), Trigger(3.0, 2.0, 0.0), Trigger.bare(3.0)]),
+    st.sampled_from([Trigger(3.0, 2.0, 0.5), Trigger(3.0, 3.0, 0.5), Trigger(3.0, 2.0, 0.0), Trigger(3.0, 3.0, 0.0)]),
 )
 @example([0.0, 3.0, 0.0, 0.0, 0.0, 3.0], Trigger(3.0, 2.0, 0.5))  # x rises to zeta just when the dwell is over
 def test_fast_triggers_are_those_of_the_independent_checker(values: list[float], trigger: Trigger) -> None:
@@ -50,8 +50,8 @@ def test_fast_triggers_are_those_of_the_independent_checker(values: list[float],
 @pytest.mark.parametrize(
     ("trigger", "x", "times"),
     [
-        (Trigger.bare(3.0), [0.0, 3.0, 0.0, 4.0, 0.0], [1.0, 2.75]),  # a touch from below triggers
-        (Trigger.bare(3.0), [4.0, 3.0, 4.0, 0.0, 4.0], [0.0, 3.75]),  # a touch from above does not release
+        (Trigger(3.0, 3.0, 0.0), [0.0, 3.0, 0.0, 4.0, 0.0], [1.0, 2.75]),  # a touch from below triggers
+        (Trigger(3.0, 3.0, 0.0), [4.0, 3.0, 4.0, 0.0, 4.0], [0.0, 3.75]),  # a touch from above does not release
         (Trigger(3.0, 2.0, 0.0), [0.0, 3.0, 2.5, 3.0, 1.0, 3.0], [1.0, 5.0]),  # above the release level in between
         (Trigger(3.0, 2.0, 0.0), [4.0, 2.0, 4.0], [0.0, 1.5]),  # a touch of the release level releases
         (Trigger(3.0, 2.0, 1.5), [4.0, 0.0, 4.0, 4.0], [0.0, 1.75]),  # below at the end of the dwell
