@@ -157,7 +157,7 @@ MUTANTS: dict[str, tuple[Any, str, Any, str, Channel]] = {
     "the UAV does not repeat": (channel, "repeated", never, "not repeated", Channel(loss=0.5)),
     "it repeats at once": (channel, "repeated", lambda box, heard, t, _, left: repeated(box, heard, t, 0.05, left),
                            "repeated at another time", Channel(0.3)),
-    "old proposals are taken up": (gatekeeper, "read", all_is_new, "a decision is missing",
+    "old proposals are taken up": (gatekeeper, "read", all_is_new, "decision on proposal ",
                                    Channel(0.05, 1.5, 0.2, duplicate=0.9, seed=10)),
     "copies are not answered": (gatekeeper, "replied", lambda d, _, *more: desk.replied(d, (), *more),
                                 "does not answer what it reads", NOISY),

@@ -254,4 +254,4 @@ def test_under_method_d_it_consents_because_it_gets_home_again() -> None:
     for verdict in judge(of_run):
         assert verdict.status == "holds", verdict
     own = of_run.proposals.assign(cause=of_run.proposals["robot"])
-    assert {"protocol", "progress"} <= faults_of(replace(of_run, proposals=own)).keys()
+    assert {"records", "progress"} <= faults_of(replace(of_run, proposals=own)).keys()

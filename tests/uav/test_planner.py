@@ -221,7 +221,7 @@ def test_no_motion_is_executed_that_was_not_decided_on(monkeypatch: pytest.Monke
     trace = simulate(load("case_a", ["duration_s=17"]), "d")
     assert len(trace.proposals) > 2
     assert (trace.executing("ugv1") >= 0).any()
-    assert set(faults_of(trace)) <= {"protocol"}  # which says that they are replaced
+    assert set(faults_of(trace)) <= {"protocol", "records"}  # which say that they are replaced
     assert decided("GATE-PLAN", trace).status == "holds"
 
 
