@@ -28,7 +28,7 @@ class Answer(NamedTuple):
 
 def wrong_executions(trace: Trace) -> list[Fault]:
     """Samples at which a UGV executes another proposal than it should; messages that break the planner's rules."""
-    return [*_executed_otherwise(trace), *_misused(trace), *_recorded_otherwise(trace)]
+    return [*_executed_otherwise(trace), *_replaced_needlessly(trace), *_recorded_otherwise(trace)]
 
 
 def _executed_otherwise(trace: Trace) -> Iterator[Fault]:
@@ -61,17 +61,12 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
             yield Fault("withdrawn at another time", sent.ugv, sent.issued_s, {"due": due, "recorded": recorded})
 
 
-def _misused(trace: Trace) -> Iterator[Fault]:
-    """Answers to a UAV that is lost, and needless replacements."""
-    every, scenario = proposals_of(trace), trace.scenario
-    heard = trace.messages[trace.messages["kind"] == "answer"].dropna(subset="read_s")
-    for uav, read_s in zip(heard["receiver"], heard["read_s"], strict=True):
-        if read_s > (scenario.aerial[uav].lost_at_s or np.inf) - TIME_TOLERANCE_S:
-            yield Fault("an answer is read by a UAV that is lost", uav, read_s)
+def _replaced_needlessly(trace: Trace) -> Iterator[Fault]:
+    """Proposals in the place of others that were in force and concerned nobody else."""
     for ugv in trace.ugvs:
-        for before, after in pairwise(sent for sent in every if sent.ugv == ugv):
+        for before, after in pairwise(sent for sent in proposals_of(trace) if sent.ugv == ugv):
             t, row = after.issued_s + TIME_TOLERANCE_S, row_at(trace, after.issued_s)
-            mates = [other for other in scenario.in_charge(after.sender) if other != ugv]
+            mates = [other for other in trace.scenario.in_charge(after.sender) if other != ugv]
             others = any(trace.column(f"{other}.mode")[row] == 1.0 for other in mates)
             alone = not (after.party or others) and after.cause == ugv
             if alone and withdrawn_s(trace, before, unless_replaced=True) > t and before.times_s[-1] > t:
