@@ -306,9 +306,10 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
             allowed |= {(about, sample) for sample in held}
             runs_out = math.ceil(runs_out_s.get(about, ends_s) / period_s - SAME_S)
             due |= {(about, sample) for sample in held if sample <= runs_out}
-    for number, at in sorted((due - decided) | (decided - allowed if scenario.channel is None else set())):
-        found = ("nothing", "one") if (number, at) in due else ("one", "nothing")
-        yield f"decision on proposal {number}", at * period_s, *found
+    for number, sample in sorted(due - decided):
+        yield f"decision on proposal {number}", sample * period_s, "nothing", "one"
+    for number, sample in sorted(decided - allowed) if scenario.channel is None else ():
+        yield f"decision on proposal {number}", sample * period_s, "one", "nothing"
 
 
 def _by_outcomes(

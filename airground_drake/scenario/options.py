@@ -42,7 +42,7 @@ OPTIONS: dict[str, Option] = {
     "-n --number": option("", "N", whole(1)),
     "-o --output": option("default: this folder", "DIR", output_folder),
     "-q --quiet": option("no progress"),
-    "--engine": option("the compiled loop, of which Drake checks a sample, or Drake alone (default: %(default)s)",
+    "--engine": option("batch: a compiled loop, and Drake repeats a sample; drake: Drake alone (default: %(default)s)",
                        choices=("batch", "drake"), default="batch"),
     "--jobs": option("processes (default: one for each processor)", "N", whole(1, MOST_JOBS)),
     "--json": option("print everything as JSON"),

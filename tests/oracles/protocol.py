@@ -62,7 +62,7 @@ def _recorded_otherwise(trace: Trace) -> Iterator[Fault]:
 
 
 def _replaced_needlessly(trace: Trace) -> Iterator[Fault]:
-    """Proposals in the place of others that were in force and concerned nobody else."""
+    """Proposals that replace one in force, though no other UGV needs it."""
     for ugv in trace.ugvs:
         for before, after in pairwise(sent for sent in proposals_of(trace) if sent.ugv == ugv):
             t, row = after.issued_s + TIME_TOLERANCE_S, row_at(trace, after.issued_s)

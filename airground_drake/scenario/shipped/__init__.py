@@ -1,4 +1,4 @@
-"""The scenarios that come with the package: their files and titles, by name; names and paths of others."""
+"""Files and titles of the scenarios that come with the package. How scenarios are named on a command line."""
 
 import re
 import shlex
