@@ -292,6 +292,7 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
     arrived = trace.messages[trace.messages["kind"] != "answer"].dropna(subset="received_s")
     sent = arrived.sort_values("received_s", kind="stable")
     due, allowed = set[tuple[int, int]](), set[tuple[int, int]]()
+    samples = math.ceil(ends_s / period_s - SAME_S)
     for ugv in trace.ugvs:
         news_of = sent[sent["receiver"] == ugv]
         mine = [*zip(*(news_of[name].tolist() for name in ("received_s", "about", "kind")), strict=True)]
@@ -300,15 +301,18 @@ def _decided(trace: Trace, scenario: Scenario) -> Wrong:
                 continue
             over = (t for t, other, news in mine[k + 1 :] if other > about or (other, news) == (about, "withdrawal"))
             # what the UAV sends at a sample the UGV has at the next one; what a channel delivers then perhaps at once
-            until = next(over, ends_s) / period_s
-            until = math.ceil(until - SAME_S) if scenario.channel else int(until + SAME_S) + 1
-            held = range(int(at_s / period_s + SAME_S) + 1, min(until, math.ceil(ends_s / period_s - SAME_S)))
-            allowed |= {(about, sample) for sample in held}
-            runs_out = math.ceil(runs_out_s.get(about, ends_s) / period_s - SAME_S)
-            due |= {(about, sample) for sample in held if sample <= runs_out}
+            first, last = at_s / period_s, next(over, ends_s) / period_s
+            may = range(int(first + SAME_S) + 1, min(samples, int(last + SAME_S) + 1))
+            runs_out = min(math.ceil(runs_out_s.get(about, ends_s) / period_s - SAME_S) + 1, may.stop)
+            must = range(may.start, runs_out)
+            if scenario.channel is not None:
+                must = range(may.start, min(runs_out, math.ceil(last - SAME_S)))
+                may = range(math.ceil(first - SAME_S), may.stop)
+            due |= {(about, sample) for sample in must}
+            allowed |= {(about, sample) for sample in may}
     for number, sample in sorted(due - decided):
         yield f"decision on proposal {number}", sample * period_s, "nothing", "one"
-    for number, sample in sorted(decided - allowed) if scenario.channel is None else ():
+    for number, sample in sorted(decided - allowed):
         yield f"decision on proposal {number}", sample * period_s, "one", "nothing"
 
 

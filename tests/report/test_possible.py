@@ -124,6 +124,8 @@ FORGERIES: dict[str, tuple[str, Any]] = {
         column("plans", "t_s", lambda f: f["t_s"] + 0.02))),
     "decided between samples": ("time of a decision ", column(
         "decisions", "t_s", lambda f: f["t_s"] + 0.02, lambda f: f["answer"] < 0)),
+    "decided too early": ("decision on proposal ", only("decisions", lambda f: pd.concat(
+        [f.head(1).assign(t_s=lambda row: row["t_s"] - 0.1, answer=-1), f]))),
     "decided twice": ("time of a decision ", only("decisions", lambda f: pd.concat([f, f.tail(1)]))),
     "a decision on another policy": ("what ugv", column("decisions", "policy", lambda f: "x")),
     "another reason": ("answer of ", column("decisions", "reason", lambda f: "no_plan", first(decision="refuse"))),
