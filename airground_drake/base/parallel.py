@@ -4,6 +4,7 @@ A piece sees the data that existed before the first piece began; only its result
 pieces one after the other, which share imports and loaded data.
 """
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -43,6 +44,19 @@ def processors() -> int:
 
 
 @contextmanager
+def shared() -> Iterator[None]:
+    """In this block, garbage collection, also in forked processes, leaves alone what existed before."""
+    # It would write to each of these objects, so that every process would copy the memory that it shares.
+    already = gc.get_freeze_count() > 0
+    gc.freeze()
+    try:
+        yield
+    finally:
+        if not already:
+            gc.unfreeze()
+
+
+@contextmanager
 def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
     """A pool of `jobs` processes, killed at the end of the block."""
     # AirgroundError if a process has died and the block has not raised.
@@ -52,7 +66,7 @@ def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
     context = multiprocessing.get_context("fork" if forks() else "spawn")
     pool = ProcessPoolExecutor(jobs, context, initializer=_begin)
     try:
-        with warnings.catch_warnings():
+        with shared(), warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
             yield pool
     except BrokenProcessPool as error:

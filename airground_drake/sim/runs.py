@@ -23,7 +23,7 @@ from typing import Any
 
 from airground_drake.base import files, interruption
 from airground_drake.base.errors import AirgroundError, PluginError, ScenarioError, SimulationError, described
-from airground_drake.base.parallel import forks, processes, processors
+from airground_drake.base.parallel import forks, processes, processors, shared
 from airground_drake.base.progress import SILENT, Progress
 from airground_drake.model.law import kernels
 from airground_drake.scenario.load import validated
@@ -130,7 +130,7 @@ def _simulated(
         import_module("pyarrow.parquet")
     progress.stage(f"simulating {what}", sum(scenario.duration_s for scenario, _ in work), "s")
     waiting, running = deque(enumerate(work)), dict[int, _Process]()
-    with files.temporary_folder() as made, warnings.catch_warnings():
+    with files.temporary_folder() as made, shared(), warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # idle threads of numerical libraries survive a fork
         try:
             while waiting or running:
