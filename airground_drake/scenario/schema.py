@@ -32,6 +32,7 @@ from airground_drake.base.values import (
     Heading,
     Loss,
     Name,
+    Noise,
     NotNegative,
     Positive,
     Real,
@@ -412,7 +413,7 @@ class Decision:
     """Release level: an intervention ends when the decision variable falls to it; below the threshold."""
     min_inter_event_s: NotNegative = 0.5
     """Minimum time between two triggers of a UGV."""
-    noise_m_sqrt_s: NotNegative = 0.0
+    noise_m_sqrt_s: Noise = 0.0
     """Noise of the decision variable in the simulation."""
     leak_1_s: NotNegative = 0.0
     """Rate at which accumulated noise decays; 0: never."""

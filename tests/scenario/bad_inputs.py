@@ -138,6 +138,7 @@ EDITS: list[tuple[str, object]] = [
     ("gatekeeper.stages", 7),
     ("decision.noise_period_s", 0.01),
     ("decision.leak_1_s", 41),
+    ("decision.noise_m_sqrt_s", 1001),
     # decision
     ("decision.release_m", 0),
     ("decision.release_m", 3),
