@@ -114,7 +114,9 @@ class RunFacts:
             return "" if self.claim(rules.OWN_DOING).status == "refuted" else "not caused by the robots"
         if len(ours) < len(doings):
             return f"{len(ours)} of {len(doings)} caused by the robots"
-        return "caused by earlier commands of the robots" if {*ours} == {"under way"} else "caused by the robots"
+        if "robot" in ours:
+            return "caused by the robots"
+        return f"caused {'partly ' if 'both' in ours else ''}by earlier commands of the robots"
 
     @property
     def contradicts_its_proof(self) -> bool:

@@ -85,7 +85,7 @@ SETTINGS = {
 # Origin of a threshold, by rule.
 THRESHOLDS = {"fixed": "set by hand", "printed": "by (19) as printed", "bayes": "Bayes optimum"}
 
-OURS = ("robot", "under way")  # values of an encounter's `doing` that are the robots' own
+OURS = ("robot", "under way", "both")  # values of an encounter's `doing` that are the robots' own
 # Class of a proposal, by whether it was accepted and how it ended.
 CLASSES: Mapping[tuple[bool, str], str] = {
     (False, "refused"): "refused", (False, "lost"): "never arrived", (True, "given up"): "dropped later",

@@ -182,6 +182,8 @@ SAFE: list[tuple[list[Edit], str, list[str]]] = [
      ["collision", "r1\N{EN DASH}man at 5.00 s", "caused by the robots", REPORT]),
     ([man, hit("man"), met("under way")], "no",
      ["collision", "r1\N{EN DASH}man at 5.00 s", UNDER_WAY]),
+    ([man, hit("man"), met("both")], "no",
+     ["collision", "r1\N{EN DASH}man at 5.00 s", "caused partly by earlier commands of the robots"]),
     ([man, hit("man"), met("other"), judged("SAFE-OWN", status="refuted")], "no",
      ["collision", "r1\N{EN DASH}man at 5.00 s"]),
     ([man, gap(0.1, "man"), gap(0.2), met("other"), MISSED], "no",

@@ -135,8 +135,8 @@ class Encounter(NamedTuple):
     t_s: float  # time of the collision, or else of the least gap
     collided: bool  # whether they collided; in the model both go on
     # `robot` if a robot's own motion reduced the distance; `under way` if it did so only within the law's allowance for
-    # a body with a lag or delay; `other` if only the other body's motion reduced it; `nobody` if they started or
-    # appeared there.
+    # a body with a lag or delay, and `both` if an obstacle moved meanwhile; `other` if only the other body's motion
+    # reduced it; `nobody` if they started or appeared there.
     doing: str
     # How far a body with a lag or delay drove on, from its last place at the required distance, or from its place when
     # the other appeared, to the least gap; 0 unless this is the cause, or the other appeared.
@@ -151,9 +151,10 @@ class Encounter(NamedTuple):
 
     def cause(self, trace: Trace) -> str:
         """The cause, as a sentence without a full stop."""
-        if self.doing == "under way":
+        if self.doing in ("under way", "both"):
             drove = f"{self.first} drove {self.under_way_m:.2f} m on by commands under way"
-            return f"{drove}, to {self.gap_m:.2f} m from {self.second}"
+            moved = ", which moved, too" if self.doing == "both" else ""
+            return f"{drove}, to {self.gap_m:.2f} m from {self.second}{moved}"
         if self.doing == "robot":
             return f"{self.first} moved to {self.gap_m:.2f} m from {self.second}"
         if self.doing == "nobody" and self.appeared:
@@ -185,8 +186,12 @@ def _encounter(trace: Trace, least: Gap) -> Encounter:
     t_s = float(trace.t[hits[0]]) if len(hits) else least.t_s
     appeared = pair.row > 0 and bool(gaps[pair.row] < pair.required_m - DISTANCE_TOLERANCE_M)
     doing = _whose_doing(trace, least)
-    drove_on = doing == "under way" or (doing == "nobody" and appeared and bounds_of(trace)[pair.first].late)
-    under_way_m = _way_m(trace, pair, gaps, least.t_s) if drove_on else 0.0
+    since = _too_near(trace, pair, gaps, least.t_s)
+    moved = pair.second not in trace.robots and bool(np.ptp(origin_of(trace, pair.second)[since], axis=0).any())
+    doing = "both" if doing == "under way" and moved else doing
+    drove_on = doing in ("under way", "both") or (doing == "nobody" and appeared and bounds_of(trace)[pair.first].late)
+    legs = np.diff(trace.body(pair.first)[since], axis=0)
+    under_way_m = float(np.linalg.norm(legs, axis=1).sum()) if drove_on else 0.0
     encounter = Encounter(
         first=pair.first, second=pair.second, required_m=pair.required_m, gap_m=max(least.gap_m, 0.0), t_s=t_s,
         collided=bool(len(hits)), doing=doing, under_way_m=under_way_m, appeared=appeared,
@@ -223,12 +228,11 @@ def _steered_nearer(trace: Trace, pair: Pair, robot: str) -> bool:
     return bool((after < np.minimum(before, keeps_m) - DISTANCE_TOLERANCE_M).any())
 
 
-def _way_m(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> float:
-    """Path length of a pair's robot body since the last row with the required gap, up to a time, m."""
+def _too_near(trace: Trace, pair: Pair, gaps: Array, t_s: float) -> slice:
+    """The rows from the last one with the required gap up to a time."""
     end = min(int(np.searchsorted(trace.t, t_s)), len(trace.t) - 1)
     apart = np.flatnonzero(gaps[pair.row : end] >= pair.required_m - DISTANCE_TOLERANCE_M)
-    begin = pair.row + (int(apart[-1]) if len(apart) else 0)
-    return float(np.linalg.norm(np.diff(trace.body(pair.first)[begin : end + 1], axis=0), axis=1).sum())
+    return slice(pair.row + (int(apart[-1]) if len(apart) else 0), end + 1)
 
 
 def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) -> Encounter:

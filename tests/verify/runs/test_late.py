@@ -75,6 +75,14 @@ def test_who_drives_on_where_a_person_stops_at_the_distance_did_it() -> None:
     assert verdicts["SAFE-OWN"].status == "refuted"
 
 
+def test_who_drives_on_towards_a_person_who_comes_did_it_together_with_them() -> None:
+    walks_on = {**PERSON, "moves": {**PERSON["moves"], "waypoints_m": [[1.2, -3.0], [1.2, 0.1]]}}
+    verdicts = found(beside(walks_on, LATE, speed=0.5, radius=0.05, obstacle_m=0.2, collision_m=0.02))
+    (met,) = verdicts["SAFE-TRACE"].evidence["encounters"]
+    assert met["doing"] == "both"
+    assert verdicts["SAFE-TRACE"].counterexample["why"].endswith(" m from rock, which moved, too")
+
+
 def test_what_is_lost_comes_off_what_the_points_keep() -> None:
     """Where a rock appears nearer to a lagging robot than required, no guarantee is above the true gap."""
     rock = {"position_m": [3.35, 0.0, 0.0], "radius_m": 0.05, "appears_s": 2.2}
