@@ -61,7 +61,8 @@ def conduct(
     try:
         if (last := max(store.finished, default=0)) >= wanted.stop:
             raise FolderError(f"{folder} has draw {last}; allowed: -n {last + 1} or more")
-        known: Any = groupby(store.table().to_dict("records"), key=itemgetter("index"))
+        before: Any = store.table().to_dict("records") if stopping is not None else ()
+        known = groupby(before, key=itemgetter("index"))
         met = stopping is not None and any(stopping.met_in_order(index, list(rows)) for index, rows in known)
         left = [] if met else [index for index in wanted if index not in store.finished]
         progress.stage(spec.name, len(left), "draws")
@@ -81,7 +82,7 @@ def conduct(
     of: dict[str, Any] = {"name": spec.name, "title": spec.title, "spec": spec.source, "stopped": stopped}
     if stopped is not None:  # other processes may have finished later draws meanwhile
         table = table[table["index"] <= stopped]
-    runs = per_run(table)
+    runs = per_run(table) if spec.swept else table[:0]
     of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept if key in runs]
     result: dict[str, Any] = files.strict(evidence(table, spec.marks, spec.dependent)) | of
     files.write_json(folder / EVIDENCE, result)

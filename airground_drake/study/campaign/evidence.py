@@ -58,17 +58,17 @@ def _tested(rows: pd.DataFrame) -> pd.Series:
 
 def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, dependent: Sequence[str] = ()) -> Json:
     # dependent: keys whose values depend on other draws; with any, claims have no intervals.
-    first = table.drop_duplicates("index")
+    drawn = drawn_keys(table.drop_duplicates("index"))
+    table = table.drop(columns=["drawn", "digest"])  # long texts, which would be copied below
     judged = table[table["ended"] == JUDGED]
     runs = judged.drop_duplicates(["index", "run"])
-    drawn = drawn_keys(first)
     failed = table[table["ended"] != JUDGED]
     unfinished = failed.loc[failed["ended"].isin(UNFINISHED), "run"].value_counts()
     ended = pd.concat([failed, judged]).drop_duplicates("index")["ended"]  # one run that was not judged is enough
     return {
         "confidence": CONFIDENCE,
         "dependent": list(dependent),
-        "draws": len(first),
+        "draws": len(drawn),
         "ended": {str(name): int(count) for name, count in ended.value_counts().items()},
         "not_judged": failed[["index", "run", "ended", "what"]].head(MOST_LISTED).to_dict("records"),
         "runs": len(runs),

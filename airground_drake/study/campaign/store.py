@@ -96,6 +96,7 @@ class Store:
         self._lately = {}
 
     def table(self) -> pd.DataFrame:
+        self._in_parts = [_together(self._in_parts, {})]  # a million draws fill gigabytes: none of them twice
         return _together(self._in_parts, self._lately)
 
     def close(self) -> None:
@@ -117,8 +118,10 @@ def read(folder: Path) -> tuple[dict[str, Any], pd.DataFrame]:
 
 
 def _together(parts: Sequence[pd.DataFrame], lately: dict[int, list[Row]]) -> pd.DataFrame:
-    both = pd.concat([*parts, table_of(list(chain.from_iterable(lately.values())))], ignore_index=True)
-    return both.sort_values("index", kind="stable", ignore_index=True)
+    both = [*parts, table_of(list(chain.from_iterable(lately.values())))] if lately else [*parts]
+    table = pd.concat(both, ignore_index=True) if len(both) > 1 else both[0]
+    in_order = table["index"].is_monotonic_increasing
+    return table if in_order else table.sort_values("index", kind="stable", ignore_index=True)
 
 
 def _is_nothing(path: Path) -> bool:
