@@ -57,6 +57,11 @@ class Solution:
     rounded: Array | None = None
     normals: Array | None = None
 
+    def __post_init__(self) -> None:
+        """Raise a ValueError if `accept_first` contradicts the plan."""
+        if self.plan is not None and self.accept_first != (self.plan[0] == 1.0):
+            raise ValueError(f"accept_first is {self.accept_first}, but the plan begins with {self.plan[0]:g}")
+
     @property
     def has_plan(self) -> bool:
         """Whether it rests on a plan, by its status."""

@@ -34,6 +34,8 @@ def test_contract(name: str) -> None:
         assert same(solution, USED[name].solve(problem, ENOUGH)), instance  # deterministic
     for instance, problem in BROKEN.items():
         assert same(USED[name].solve(problem, ENOUGH), Solution(False, "refused_not_finite")), instance
+    with pytest.raises(ValueError, match="accept_first is False, but the plan begins with 1"):
+        Solution(False, "optimal", plan=np.ones(2))
 
 
 @examples(120, fuzz=2000)
