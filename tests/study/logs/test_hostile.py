@@ -166,6 +166,7 @@ def test_noise_after_the_mark_of_a_kind_is_refused(start: bytes, tmp_path: Path,
         (LONG.replace("tb_0", "nobody"), "tb_0 is not in the log"),
         (LONG.replace(",0.0000,", ",1e155,"), "has a value beyond 1e+12; wanted: seconds and metres"),
         (LONG.replace("0.0000", "inf"), ""),
+        (re.sub(r"(?m)^\d", "9999-12-31 23:59:5", LONG), "tb_0 has no usable rows: 31 with no time, first in line 2"),
     ],
 )
 def test_a_table_that_cannot_be_used_says_what_is_wanted(
