@@ -443,6 +443,11 @@ FORMS = {
         FULL, (), {"columns": {"t": "clock", "body": "who", "x": "px_", "y": "py_", "z": "up"},
                    "rename": {"A": "tb_0", "B": "tb_1"}},
     ),
+    "other names with units": Form(
+        table("log.csv", lambda: [["clock", "id", "eastCm", "north_cm", "up (cm)"], *logs.long(FULL, scale=100.0)[1:]]),
+        FULL, ("lengths are in centimetres, as the file says",),
+        {"columns": {"t": "clock", "body": "id", "x": "eastCm", "y": "north_cm", "z": "up (cm)"}},
+    ),
     "other names, wide": Form(
         table("log.csv", lambda: logs.wide(FULL, "{}<{}>")), FULL, (),
         {"columns": {"x": "{body}<x>", "y": "{body}<y>", "z": "{body}<z>"}},

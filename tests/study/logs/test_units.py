@@ -98,9 +98,13 @@ def test_eight_columns_without_a_header_are_tum_only_if_four_are_a_quaternion(tm
         ({"frame": "battery"}, "t,body,x,y,z,battery", "--map-columns frame=battery has no effect"),
         ({"body": "battery"}, "t,who,tb_0_x,tb_0_y,tb_0_z,battery", "--map-columns body=battery has no effect"),
         ({"z": "battery"}, "t,who,tb_0_x,tb_0_y,tb_0_z,battery", "--map-columns z=battery has no effect"),
+        ({"x": "east_ft"}, "t,body,east_ft,y,z,battery", "says 'ft'; wanted: a column in m, cm, mm; if its name is wr"),
+        ({"x": "EastIn"}, "t,body,EastIn,y,z,battery", "x=EastIn: the name of that column says 'in'; wanted: a column"),
+        ({"x_m": "east [mm]"}, "t,body,east [mm],y,z,b", r"says 'mm'; wanted: x_mm=east \[mm\]; if its name is wrong"),
+        ({"t": "clock_min"}, "clock_min,body,x,y,z,battery", "says 'min'; wanted: a column in s, ms, us, ns; if its"),
     ],
 )
-def test_a_column_that_is_chosen_in_vain_is_refused(
+def test_a_column_that_is_chosen_in_vain_or_in_another_unit_is_refused(
     columns: dict[str, str], head: str, says: str, tmp_path: Path
 ) -> None:
     rows = [[*line, "97"] for line in logs.long({"tb_0": FULL["tb_0"]})[1:]]
