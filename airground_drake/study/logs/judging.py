@@ -34,7 +34,7 @@ from airground_drake.check.scenario import (
     written,
 )
 from airground_drake.check.shapes import Shape
-from airground_drake.study.logs.tracks import Span, Track, Tracks, height_m
+from airground_drake.study.logs.tracks import Span, Track, Tracks, height_m, joint
 
 # Whether a distance was kept where the log covers it; open: the position error decides.
 KEPT, BROKEN, OPEN = "kept", "NOT KEPT", "open"
@@ -42,7 +42,8 @@ LAST_S = 1.0  # time before the least distance over which approaches are attribu
 STEPS = 100  # number of parts of that time in which both motions are separated
 STAMP_S = 2e-9  # accuracy of the time between two stamps
 HALVINGS = 60  # halvings of an interval in the search for a time
-# Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this.
+# Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this. A body
+# may begin later than the log, or end earlier, by no more, either.
 MOST_SPARE = 0.05
 NOT_JUDGED = (
     "motion between two samples: it is taken as straight",
@@ -270,7 +271,8 @@ def _judged(
         below += _below(pair.shape, apart, t_s, pair.safe_m - SMALL)
         law.add(t_s, own_m, other_m)
     body = barriers_of(scenario).get(pair.other)
-    gaps = _gaps(spans, _there(body, whole) if body else whole, own, other)
+    spare_s = MOST_SPARE * float(scenario["duration_s"])
+    gaps = _gaps(spans, _there(body, whole) if body else whole, own, other, spare_s)
     too_fast = _too_fast(other, scenario, pair, errors_m.get(pair.other, 0.0))
     promised = pair.gap_m - law.deficit - eps
     return JudgedPair(
@@ -386,14 +388,14 @@ def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
     return below_s
 
 
-def _gaps(spans: list[Span], whole: Span, own: Track, other: Track) -> list[Span]:
-    """Gaps between stretches with both bodies recorded, and at the ends if longer than usual."""
+def _gaps(spans: list[Span], whole: Span, own: Track, other: Track, spare_s: float) -> list[Span]:
+    """Gaps between stretches with both bodies recorded, and at the ends if longer than usual or than `spare_s`."""
     edges = [whole.begin, *(edge for span in spans for edge in span), whole.end]
     gaps = [Span(*both) for both in zip(edges[::2], edges[1::2], strict=True)]
     inner = [gap for gap in gaps[1:-1] if gap.end > gap.begin]
-    late = max(track.t_s[0] - whole.begin - track.gap_s * (1.0 + 1e-9) for track in (own, other))
-    early = max(whole.end - track.t_s[-1] - track.gap_s * (1.0 + 1e-9) for track in (own, other))
-    return sorted([*inner, *(gap for gap, lacks in ((gaps[0], late), (gaps[-1], early)) if lacks > 0.0)])
+    late = max(track.t_s[0] - whole.begin - min(track.gap_s, spare_s) * (1.0 + 1e-9) for track in (own, other))
+    early = max(whole.end - track.t_s[-1] - min(track.gap_s, spare_s) * (1.0 + 1e-9) for track in (own, other))
+    return joint(sorted([*inner, *(gap for gap, lacks in ((gaps[0], late), (gaps[-1], early)) if lacks > 0.0)]))
 
 
 def _came(pair: Pair, own: Track, other: Track, span: Span) -> dict[str, float]:

@@ -1,7 +1,6 @@
 """A judged log as a page: verdict, map, distances over time, results of each pair; and a replay."""
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -177,8 +176,8 @@ def scene(judged: Judged, tracks: Tracks, scenario: Scenario, logs: Sequence[str
         for pair in judged.pairs if pair.status == BROKEN for span in pair.below_s
     ]  # fmt: skip
     events += [
-        {"t_s": end - judged.begin_s, "kind": "not recorded", "robot": f"{name}, for {begin - end:.2f} s"}
-        for name, track in tracks.bodies.items() for (_, end), (begin, _) in pairwise(track.spans)
+        {"t_s": gap.begin - judged.begin_s, "kind": "not recorded", "robot": f"{name}, for {gap.end - gap.begin:.2f} s"}
+        for name, track in tracks.bodies.items() for gap in track.gaps
     ]  # fmt: skip
     return Scene(
         **{**vars(still), "robots": tuple(bodies)}, scenario=scenario, run=", ".join(Path(log).name for log in logs),

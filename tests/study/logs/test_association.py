@@ -64,15 +64,15 @@ def test_nothing_is_claimed_in_a_gap(mark: str | None, tmp_path: Path, document:
 
 
 def test_where_a_body_leaps_nothing_is_claimed(tmp_path: Path, document: dict[str, Any]) -> None:
-    """The last place is written again while it is lost, as if it stood: only the leap at the end shows it."""
+    """The last place is written again while it is lost, as if it stood; the leap at the end shows it."""
     t_s, places = FULL["tb_1"]
     held = places.copy()
     held[(t_s > 2.4) & (t_s < 3.6)] = places[t_s <= 2.4][-1]
     found = logs.read(written(tmp_path, logs.long({**FULL, "tb_1": (t_s, held)})), document)
     judged = judge(found, document)
-    assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(3.55), pytest.approx(3.6))]
-    assert not judged.covers_all
-    assert any("tb_1: 1 steps that are more than 5 times faster than 1 m/s" in said for said in found.remarks)
+    assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(2.4), pytest.approx(3.6))]
+    assert (judged.covers_all, found.bodies["tb_1"].gaps) == (False, pair_of(judged.pairs, *BROKEN).gaps_s)
+    assert any("tb_1: 1 step more than 5 times faster than 1 m/s, first to 3.6 s" in said for said in found.remarks)
     far = written(tmp_path, logs.long({**FULL, "tb_1": (t_s, 1000.0 * places)}))
     with pytest.raises(LogError, match="tb_1: 120 of 120 steps are more than 5 times faster than 1 m/s; wanted: --len"):
         logs.read(far, document, length_unit="m")
@@ -104,7 +104,7 @@ def test_a_robot_that_stands_at_the_origin_at_first_is_there(tmp_path: Path) -> 
     [
         ("t,body,odom_x,odom_y,gps_x,gps_y", "{t},{name},{x},{y},{x},{y}", {}, "it has several places in a row: odom"),
         ("t;body;x;y", "{t};{name};{mm};0", {}, "numbers such as -2,000 stand beside 700; wanted: no commas of"),
-        ("t,body,x,y,frame_id", "{t},{name},{x},{y},map", {"frames": ["mpa"]}, "the log has no such frame; it has map"),
+        ("t,body,x,y,frame_id", "{t},{name},{x},{y},map", {"frames": ["mpa"]}, "no position is in it, and transforms"),
         ("tb_0.t,tb_0.x,tb_0.y,tb_1.x,tb_1.y", "{t},{x},{y},{x},{y}", {}, "tb_1 has no times of its own: there are"),
     ],
 )
@@ -173,6 +173,14 @@ def test_one_lost_row_is_no_gap_two_are(tmp_path: Path, document: dict[str, Any]
         table, _ = with_gap(1.0, end_s, None)
         pair = pair_of(judge(logs.read(written(tmp_path, table), document), document).pairs, *BROKEN)
         assert len(pair.gaps_s) == gaps
+
+
+def test_a_body_that_is_recorded_at_few_times_is_not_covered_to_the_end(
+    tmp_path: Path, document: dict[str, Any]
+) -> None:
+    few = {**FULL, "tb_1": (FULL["tb_1"][0][:61:60], FULL["tb_1"][1][:61:60])}
+    judged = judge(logs.read(written(tmp_path, logs.long(few)), document), document)
+    assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(3.0), pytest.approx(6.0))]
 
 
 def test_a_log_that_is_shorter_than_the_scenario_says_so(tmp_path: Path, document: dict[str, Any]) -> None:

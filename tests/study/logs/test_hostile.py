@@ -98,6 +98,23 @@ def test_a_recording_that_was_cut_off_is_judged_as_far_as_it_goes(tmp_path: Path
     assert not judge(found, document).covers_all
 
 
+def test_a_changed_position_and_messages_beside_a_file_are_noticed(tmp_path: Path, document: dict[str, Any]) -> None:
+    """A recording has checksums; what a killed recorder had not moved into its database is in another file."""
+    from mcap.writer import CompressionType
+
+    path = tmp_path / "a.mcap"
+    logs.mcap_json(path, logs.foxglove(FULL, {}), compression=CompressionType.NONE)
+    path.write_bytes(path.read_bytes().replace(b'"y": 0.6', b'"y": 0.9'))
+    assert "it cannot be read as MCAP to its end: CRCValidationError" in judged_or_refused(path, document)
+    base = sqlite3.connect(of_db3(tmp_path))
+    base.executescript("PRAGMA journal_mode=WAL; DELETE FROM messages WHERE id > 60")
+    said = "a.db3-wal beside it has messages that it lacks; wanted: sqlite3 a.db3 VACUUM"
+    assert said in judged_or_refused(tmp_path / "a.db3", document)
+    base.execute("VACUUM")
+    base.close()
+    assert judged_or_refused(tmp_path / "a.db3", document) == ""
+
+
 @pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
 def test_changed_bytes_end_in_a_line_or_in_a_verdict(
     write: Callable[[Path], Path], tmp_path: Path, document: dict[str, Any]
