@@ -14,10 +14,11 @@ from builders import logs
 from commands.conftest import Airground
 
 from airground_drake.report.export import recording
+from airground_drake.report.view.plane import Frame
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
-from airground_drake.study.logs import judging
+from airground_drake.study.logs import judging, page
 
 Run = Callable[[str, str], Trace]
 BETWEEN_M = 5e-4
@@ -179,6 +180,23 @@ def test_the_page_of_a_log_with_gaps_draws_none_of_them(tmp_path: Path, airgroun
     assert "No distance was broken where the log covers it." in page
     assert "not recorded, tb_1, for 1.20 s" in replay
     assert "UGV: own task" not in replay  # a log does not say so
+
+
+def test_a_map_is_as_wide_as_others_and_its_ways_cut_no_corners(tmp_path: Path, airground: Airground) -> None:
+    t_s = np.arange(0.0, 6000.0, 0.5)  # 200 laps
+    laps = 2.0 * np.stack([np.cos(0.21 * t_s), np.sin(0.21 * t_s)], axis=1)
+    drawn = page._drawn(laps, Frame(-2.0, 2.0, -2.0, 2.0))
+    assert np.nanmax(np.hypot(*np.diff(drawn, axis=0).T)) < 0.25
+    assert np.nanmin(np.hypot(*drawn.T)) > 1.99
+    assert len(drawn) < 0.5 * len(laps)
+    t_s = np.arange(0.0, 60.0, 0.5)
+    corridor = {
+        name: (t_s, np.stack([0.0 * t_s + x, t_s, 0.0 * t_s], axis=1)) for name, x in (("tb_0", 0.0), ("tb_1", 2.0))
+    }
+    (tmp_path / "corridor.csv").write_text(logs.text(logs.long(corridor)))
+    scenario = logs.write_scenario(tmp_path, obstacles={})
+    airground("judge", tmp_path / "corridor.csv", "--scenario", scenario, "-o", tmp_path / "judged")
+    assert '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 432 ' in (tmp_path / "judged/judged.html").read_text()
 
 
 @pytest.mark.parametrize(
