@@ -45,6 +45,9 @@ HALVINGS = 60  # halvings of an interval in the search for a time
 # Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this. A body
 # may begin later than the log, or end earlier, by no more, either.
 MOST_SPARE = 0.05
+# Robots that are always farther from their starts, and from obstacles, than so many times the scenario's size are in
+# another frame.
+FAR = 3.0
 NOT_JUDGED = (
     "motion between two samples: it is taken as straight",
     "places of obstacles at rest, walls and maps: the scenario's are taken",
@@ -125,6 +128,7 @@ class Judged(NamedTuple):
     stray_m: float  # how far a robot can be from that straight line at its speed limit
     speeds_m_s: dict[str, tuple[float, float]]  # largest speed of each robot in the log, and its limit
     away_m: dict[str, float]  # distance of each robot's start from its start in the scenario
+    by_scenario: bool  # whether distances to obstacles at rest are judged, whose places are the scenario's
     not_judged: tuple[str, ...]
 
     @property
@@ -160,6 +164,14 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
     stray = max((0.5 * limit * longest[name] for name, (_, limit) in speeds.items()), default=0.0)
     if not pairs:
         raise LogError(f"no distance is left to judge: of {', '.join(bodies)} nothing else is in the log or scenario")
+    to_rest = [pair.least_m for pair in pairs if pair.second not in {*bodies}]
+    places = [ugv[key][:2] for ugv in scenario["ugvs"].values() for key in ("start_m", "target_m")]
+    if to_rest and away and min(*to_rest, *away.values()) > FAR * max(1.0, float(np.ptp(places, axis=0).max())):
+        raise LogError(
+            f"{next(iter(away))} starts {next(iter(away.values())):.3g} m from its start in the scenario, and no robot "
+            "comes near an obstacle: the log is in another frame; wanted: positions in the scenario's frame, or a "
+            "scenario without obstacles and map"
+        )
     return Judged(
         pairs=sorted(pairs, key=lambda pair: pair.margin_m),
         begin_s=whole.begin,
@@ -170,6 +182,7 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
         stray_m=stray,
         speeds_m_s=speeds,
         away_m=away,
+        by_scenario=bool(to_rest),
         not_judged=(*NOT_JUDGED, *((NOT_JUDGED_OF_OLD,) if is_asynchronous(scenario) else ())),
     )
 
