@@ -13,7 +13,7 @@ import re
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain
 from pathlib import Path
@@ -88,89 +88,58 @@ def read_text(path: Path) -> str:
     return read_bytes(path, LARGEST_TEXT).decode()
 
 
-def read_table(content: bytes) -> pd.DataFrame:
+def read_table(content: bytes, left_out: dict[str, str] | None = None) -> pd.DataFrame:
     """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers."""
+    # left_out: for a file of another program; gets columns that are not read, with their types. In such a file times are
+    # read, too, and no lists; parts of structures are columns, and so is an index that was kept.
+    #
+    # The declared types and sizes are checked before the file is unpacked. A few bytes may stand for a long text in a
+    # million rows, so texts are counted before they are copied into their rows.
     import pandas as pd
     import pyarrow as pa
+    import pyarrow.compute as pc
+    import pyarrow.parquet as pq
 
-    with _schema_of(content) as schema:
-        texts = [field.name for field in schema if field.type in (pa.string(), pa.large_string())]
-        for field in schema:
-            kind = field.type.value_type if pa.types.is_list(field.type) else field.type
-            if field.name not in texts and not _is_number(kind):
-                raise ValueError(f"column {field.name!r} is of type {field.type}")
-        _bound(content, schema.names, texts)
-        return pd.read_parquet(io.BytesIO(content))
-
-
-def read_foreign_table(content: bytes) -> tuple[pd.DataFrame, dict[str, str]]:
-    """The table in a Parquet file of another program, which may be hostile; types of columns left out, by name."""
-    # Numbers, texts and times are read. Parts of structures are columns, and so is an index that was kept.
-    import pyarrow as pa
-
-    times = pa.types.is_timestamp, pa.types.is_duration
+    types, is_ours = pa.types, left_out is None
+    numbers = [types.is_floating, types.is_integer, types.is_boolean, types.is_null]
+    numbers += [] if is_ours else [types.is_decimal, types.is_timestamp, types.is_duration]
 
     def columns(fields: Iterable[Any], above: str = "") -> Iterator[tuple[str, Any]]:
         for field in fields:
             name, kind = f"{above}{field.name}", field.type
-            kind = kind.value_type if pa.types.is_dictionary(kind) else kind
-            yield from columns(kind, f"{name}.") if pa.types.is_struct(kind) else [(name, kind)]
+            kind = kind.value_type if types.is_dictionary(kind) and not is_ours else kind
+            yield from columns(kind, f"{name}.") if types.is_struct(kind) and not is_ours else [(name, kind)]
 
-    with _schema_of(content) as schema:
-        kinds = dict(columns(schema))
-        texts = [name for name, kind in kinds.items() if kind in (pa.string(), pa.large_string(), pa.string_view())]
-        others = {
-            name: str(kind) for name, kind in kinds.items()
-            if not (name in texts or _is_number(kind) or pa.types.is_decimal(kind) or any(is_(kind) for is_ in times))
-        }  # fmt: skip
-        usable = [name for name in kinds if name not in others]
-        _bound(content, usable, texts)
-        return _columns(content, usable).to_pandas(ignore_metadata=True, integer_object_nulls=True), others
-
-
-@contextmanager
-def _schema_of(content: bytes) -> Iterator[Any]:
-    """The schema of a Parquet file; ValueError if that or the block fails."""
-    import pyarrow.parquet as pq
+    def read(names: list[str], coded: Sequence[str] = ()) -> Any:
+        table = pq.ParquetFile(io.BytesIO(content), read_dictionary=coded).read(columns=names)
+        while any(map(types.is_struct, table.schema.types)):
+            table = table.flatten()
+        return table.select(names)
 
     try:
-        yield pq.ParquetFile(io.BytesIO(content)).schema_arrow
-    except Exception as error:  # pyarrow raises many kinds
-        raise ValueError(f"no table that can be used: {error}") from error
-
-
-def _is_number(kind: Any) -> bool:
-    from pyarrow import types
-
-    return any(is_kind(kind) for is_kind in (types.is_floating, types.is_integer, types.is_boolean, types.is_null))
-
-
-def _columns(content: bytes, names: list[str], texts: Sequence[str] = ()) -> Any:
-    """Columns of a Parquet file, those with texts as categories; a part of a structure is named after both."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    table = pq.ParquetFile(io.BytesIO(content), read_dictionary=texts).read(columns=names)
-    while any(map(pa.types.is_struct, table.schema.types)):
-        table = table.flatten()
-    return table.select(names)
-
-
-def _bound(content: bytes, names: Collection[str], texts: list[str]) -> None:
-    """Check how much these columns of a Parquet file are, `texts` among them, before they are unpacked."""
-    # A few bytes may stand for a long text in a million rows, so texts are counted before they are copied into rows.
-    import pyarrow.compute as pc
-    import pyarrow.parquet as pq
-
-    about, outer = pq.ParquetFile(io.BytesIO(content)).metadata, {name.split(".")[0] for name in names}
-    chunks = [about.row_group(i).column(j) for i in range(about.num_row_groups) for j in range(about.num_columns)]
-    chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] in outer]
-    _within("cells", max(about.num_rows * len(names), sum(chunk.num_values for chunk in chunks)), MOST_CELLS)
-    _within("bytes", sum(chunk.total_uncompressed_size for chunk in chunks), MOST_UNPACKED)
-    if texts:
-        parts = [part for column in _columns(content, texts, texts).columns for part in column.chunks]
+        file = pq.ParquetFile(io.BytesIO(content))
+        about, kinds = file.metadata, dict(columns(file.schema_arrow))
+        texts = [name for name, kind in kinds.items() if kind in (pa.string(), pa.large_string(), pa.string_view())]
+        for name, kind in [*kinds.items()]:
+            plain = kind.value_type if types.is_list(kind) and is_ours else kind
+            if name in texts or any(is_kind(plain) for is_kind in numbers):
+                continue
+            if left_out is None:
+                raise ValueError(f"column {name!r} is of type {kind}")
+            left_out[name] = str(kinds.pop(name))
+        outer = {name.split(".")[0] for name in kinds}
+        chunks = [about.row_group(i).column(j) for i in range(about.num_row_groups) for j in range(about.num_columns)]
+        chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] in outer]
+        _within("cells", max(about.num_rows * len(kinds), sum(c.num_values for c in chunks)), MOST_CELLS)
+        _within("bytes", sum(c.total_uncompressed_size for c in chunks), MOST_UNPACKED)
+        parts = [part for column in read(texts, texts).columns for part in column.chunks] if texts else []
         sizes = (pc.sum(pc.binary_length(part.dictionary).take(part.indices)).as_py() or 0 for part in parts)
         _within("bytes of text", sum(sizes), MOST_UNPACKED)
+        if is_ours:
+            return pd.read_parquet(io.BytesIO(content))
+        return read([*kinds]).to_pandas(ignore_metadata=True, integer_object_nulls=True)
+    except Exception as error:  # pyarrow raises many kinds
+        raise ValueError(f"no table that can be used: {error}") from error
 
 
 def _within(what: str, count: int, most: int) -> None:

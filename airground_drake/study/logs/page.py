@@ -29,8 +29,7 @@ from airground_drake.study.logs.tracks import Track, Tracks
 PAGE, REPLAY = "judged.html", "replay.html"
 MOST_PANELS, MOST_ROWS = 6, 500  # pairs with a drawing of their distance, and pairs in the table; `--json` has all
 NEAR = 2.0  # a pair came near if its least distance is below this multiple of the required one
-# Parts of a map's larger side within which a step is not drawn, from fine to coarse, and rows of a way that are enough.
-CELLS, MOST_DRAWN = (400, 200, 100), 20_000
+CELLS = 400  # parts of a map's larger side within which a step is not drawn
 LONGEST_REPLAY_S = 1200.0  # of a longer log there is no replay: its page would be too large
 _MAP_IN, _PANEL_IN, _HEIGHT_IN = 6.0, 7.5, 2.1
 
@@ -99,19 +98,15 @@ def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
 def _drawn(way_m: Array, frame: Frame) -> Array:
     """A way (K, 2), m, as it is drawn; a row of nan stands where it repeats what is drawn already."""
     # Of a long log, rows at equal distances in time would cut corners, and the ways would lead through obstacles.
-    drawn = way_m
-    for cells in CELLS if len(way_m) > canvas.MAX_POINTS else ():
-        number = np.round(way_m * (cells / max(frame.right - frame.left, frame.top - frame.bottom)))
-        moves = np.append(True, np.diff(number, axis=0).any(axis=1))
-        at = np.unique(number[moves], axis=0, return_inverse=True)[1].reshape(-1)
-        steps = np.sort(np.stack([at[:-1], at[1:]], axis=1), axis=1)
-        new = np.zeros(len(steps), dtype=bool)
-        new[np.unique(steps, axis=0, return_index=True)[1]] = True
-        kept = np.append(new, False) | np.append(False, new)
-        drawn = np.where(kept[:, None], way_m[moves], np.nan)[kept | np.append(True, kept[:-1])]
-        if len(drawn) <= MOST_DRAWN:
-            break
-    return drawn
+    if len(way_m) <= canvas.MAX_POINTS:
+        return way_m
+    cells = np.round(way_m * (CELLS / max(frame.right - frame.left, frame.top - frame.bottom)))
+    moves = np.append(True, np.diff(cells, axis=0).any(axis=1))
+    at = np.unique(cells[moves], axis=0, return_inverse=True)[1].reshape(-1)
+    new = np.zeros(len(at) - 1, dtype=bool)
+    new[np.unique(np.sort(np.stack([at[:-1], at[1:]], axis=1), axis=1), axis=0, return_index=True)[1]] = True
+    kept = np.append(new, False) | np.append(False, new)
+    return np.where(kept[:, None], way_m[moves], np.nan)[kept | np.append(True, kept[:-1])]
 
 
 def _distances(judged: Judged, tracks: Tracks, scenario: Json) -> list[Figure]:

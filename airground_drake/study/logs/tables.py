@@ -103,13 +103,16 @@ def _frames(table: text.Table, has: Columns) -> pd.Series | None:
 
 def _parquet(content: bytes) -> text.Table:
     """A table of numbers, times and texts; columns of other types are empty."""
+    others = dict[str, str]()
     try:
-        table, others = files.read_foreign_table(content)
+        table = files.read_table(content, others)
         texts = {k: [*map(_written, table.iloc[:, k].tolist())] for k in range(table.shape[1])}
     except (ValueError, OverflowError) as error:
         raise LogError(str(error)) from None
     cells = pd.DataFrame(texts | {table.shape[1] + k: "" for k in range(len(others))}, dtype=str, index=table.index)
     labels = [*map(str, table.columns), *others]
+    if (index := "__index_level_0__") in table and table[index].dtype.kind in "mM":  # one without a name, with times
+        labels[labels.index(index)] = "__time"
     return text.Table(labels, cells, range(1, len(table) + 1), [], True, [], others)
 
 

@@ -168,16 +168,11 @@ def test_a_line_across_the_gap_would_say_something_else(tmp_path: Path, document
     assert pair.least_m == pytest.approx(logs.least_gaps(left)[BROKEN][0], abs=1e-9)
 
 
-def test_one_lost_row_is_no_gap_two_are(tmp_path: Path, document: dict[str, Any]) -> None:
+def test_one_lost_row_is_no_gap_two_are_and_so_is_half_of_the_log(tmp_path: Path, document: dict[str, Any]) -> None:
     for end_s, gaps in ((1.10, 0), (1.15, 1)):
         table, _ = with_gap(1.0, end_s, None)
         pair = pair_of(judge(logs.read(written(tmp_path, table), document), document).pairs, *BROKEN)
         assert len(pair.gaps_s) == gaps
-
-
-def test_a_body_that_is_recorded_at_few_times_is_not_covered_to_the_end(
-    tmp_path: Path, document: dict[str, Any]
-) -> None:
     few = {**FULL, "tb_1": (FULL["tb_1"][0][:61:60], FULL["tb_1"][1][:61:60])}
     judged = judge(logs.read(written(tmp_path, logs.long(few)), document), document)
     assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(3.0), pytest.approx(6.0))]
@@ -242,30 +237,33 @@ def test_of_two_rows_of_one_time_the_first_counts_and_the_contradiction_is_named
 # --- names and frames ------------------------------------------------------------------------------------------------
 
 
-def posed(folder: Path, frames: dict[str, str], topics: dict[str, str] | None = None, start: bool = False) -> Path:
-    """A ROS 2 bag of odometry, each body in a frame; `start`: each from where it started."""
+def posed(folder: Path, frames: dict[str, str], topics: dict[str, str] | None = None) -> Path:
+    """A ROS 2 bag of odometry, each body in a frame."""
     ros, said = Ros(2), []
     for t, name, place in logs.rows(FULL):
         ns = logs.EPOCH_NS + round(t * 1e9)
-        own = place - FULL[name][1][0] if start else place
         said.append(
-            (ns, (topics or {}).get(name, f"/{name}/odom"), *ros.odometry(ns, frames[name], f"{name}/base", own))
+            (ns, (topics or {}).get(name, f"/{name}/odom"), *ros.odometry(ns, frames[name], f"{name}/base", place))
         )
     logs.write_ros2(folder / "bag", ros, said, "SQLITE3")
     return folder / "bag"
 
 
-def test_odometry_in_frames_of_each_robots_own_is_refused(tmp_path: Path, document: dict[str, Any]) -> None:
-    path = posed(tmp_path, {name: f"{name}/odom" for name in FULL}, start=True)
-    with pytest.raises(LogError, match="tb_0 in tb_0/odom, tb_1 in tb_1/odom, uav in uav/odom"):
+@pytest.mark.parametrize(
+    ("frames", "says"),
+    [
+        ({name: f"{name}/odom" for name in FULL}, "tb_0 in tb_0/odom, tb_1 in tb_1/odom, uav in uav/odom"),
+        (dict.fromkeys(FULL, "odom"), "--frame odom if this is one for all"),
+        ({"tb_0": "map", "tb_1": "world", "uav": "map"}, "positions are in different frames"),
+    ],
+)
+def test_frames_that_may_differ_are_refused_unless_they_are_said_to_be_one(
+    frames: dict[str, str], says: str, tmp_path: Path, document: dict[str, Any]
+) -> None:
+    path = posed(tmp_path, frames)
+    with pytest.raises(LogError, match=says):
         logs.read(path, document)
-
-
-def test_a_frame_called_odom_is_refused_unless_it_is_said_to_be_one(tmp_path: Path, document: dict[str, Any]) -> None:
-    path = posed(tmp_path, dict.fromkeys(FULL, "odom"))
-    with pytest.raises(LogError, match="--frame odom if this is one for all"):
-        logs.read(path, document)
-    assert judge(logs.read(path, document, frames=["odom"]), document).status == NOT_KEPT
+    assert judge(logs.read(path, document, frames=[*frames.values()]), document).status == NOT_KEPT
 
 
 def test_robots_that_all_start_at_zero_are_refused_where_no_frame_is_stated(
@@ -274,13 +272,6 @@ def test_robots_that_all_start_at_zero_are_refused_where_no_frame_is_stated(
     own = {name: (t_s, places - places[0]) for name, (t_s, places) in FULL.items()}
     with pytest.raises(LogError, match=r"tb_0, tb_1 all start at \(0, 0\)"):
         logs.read(written(tmp_path, logs.long(own)), document)
-
-
-def test_two_names_of_one_frame_can_be_said_to_be_one(tmp_path: Path, document: dict[str, Any]) -> None:
-    path = posed(tmp_path, {"tb_0": "map", "tb_1": "world", "uav": "map"})
-    with pytest.raises(LogError, match="positions are in different frames"):
-        logs.read(path, document)
-    assert judge(logs.read(path, document, frames=["map", "world"]), document).status == NOT_KEPT
 
 
 def test_a_body_in_two_topics_needs_a_word_from_the_user(tmp_path: Path, document: dict[str, Any]) -> None:
@@ -321,10 +312,8 @@ def test_names_that_do_not_fit_are_listed_with_what_helps(tmp_path: Path, docume
         logs.read(path, document, rename={"c": "tb_1"})
     with pytest.raises(LogError, match="the scenario has no tb_9"):
         logs.read(path, document, rename={"b": "tb_9"})
-    assert {pair.first for pair in judge(logs.read(path, document, without=["tb_1"]), document).pairs} == {
-        "tb_0",
-        "uav",
-    }
+    found = judge(logs.read(path, document, without=["tb_1"]), document)
+    assert {pair.first for pair in found.pairs} == {"tb_0", "uav"}
 
 
 # --- heights, further UAVs, errors -----------------------------------------------------------------------------------

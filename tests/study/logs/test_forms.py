@@ -421,6 +421,9 @@ FORMS = {
                    ("uav is not in the log",)),
     "parquet": Form(parquet, FULL),
     "parquet with dates": Form(partial(parquet, change=dated), FULL),
+    "parquet with dates as an index": Form(
+        partial(parquet, change=lambda frame: dated(frame).set_index("t_s").rename_axis(None)), FULL
+    ),
     "parquet of a frame with an index and categories": Form(
         partial(parquet, change=lambda frame: frame.astype({"body": "category"}).set_index("t_s")), FULL
     ),
