@@ -90,8 +90,8 @@ def read_text(path: Path) -> str:
 
 def read_table(content: bytes, left_out: dict[str, str] | None = None) -> pd.DataFrame:
     """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers."""
-    # left_out: for a file of another program; gets columns that are not read, with their types. In such a file times are
-    # read, too, and no lists; parts of structures are columns, and so is an index that was kept.
+    # left_out: for a file of another program; gets columns that are not read, with their types. Times are read there,
+    # too, and no lists; parts of structures are columns, and so is an index that was kept.
     #
     # The declared types and sizes are checked before the file is unpacked. A few bytes may stand for a long text in a
     # million rows, so texts are counted before they are copied into their rows.

@@ -77,7 +77,7 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
         log.ignored.append(f"{path.name}: columns {listed(others)}")
     if table.odd:
         where = f"first line {table.odd[0]}"
-        log.ignored.append(f"{path.name}: lines with another number of fields: {len(table.odd)}, {where}")
+        log.ignored.append(f"{path.name}: lines with another number of fields, or cut off: {len(table.odd)}, {where}")
     return log
 
 

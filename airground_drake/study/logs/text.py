@@ -38,7 +38,7 @@ class Table(NamedTuple):
     lines: Sequence[int]  # number of each row's line in the file
     above: list[str]  # lines above the header, and comments
     has_header: bool  # whether there was one
-    odd: list[int]  # numbers of the lines that have another number of fields, and are left out
+    odd: list[int]  # numbers of the lines that are left out: with another number of fields, or cut off
     unread: Mapping[str, str] = MappingProxyType({})  # types of columns that are left out, by label
 
 
@@ -67,7 +67,10 @@ def read(content: bytes) -> Table:
     data = [k for k in full if k >= first]
     if len(data) > MOST_ROWS:
         raise LogError(f"it has {len(data)} rows; allowed: {MOST_ROWS}")
-    good = [k for k in data if _count(lines[k], delimiter) == count]
+    # A logger that crashes may cut off its last number: that has fewer digits than the one above it, and no line's end.
+    digits = [len(re.split(r"[.,;|\s]", line)[-1]) for line in lines[-2:]]
+    whole = len(lines) - (digits[-1] < digits[0])
+    good = [k for k in data if k < whole and _count(lines[k], delimiter) == count]
     chosen = set(good)
     try:
         with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):  # quotes joined lines

@@ -115,6 +115,15 @@ def test_a_changed_position_and_messages_beside_a_file_are_noticed(tmp_path: Pat
     assert judged_or_refused(tmp_path / "a.db3", document) == ""
 
 
+def test_a_number_that_was_cut_off_is_no_position(tmp_path: Path, document: dict[str, Any]) -> None:
+    rows = [f"{t},{name},{x:.4f},{y:.4f}\n" for t, name, (x, y, _) in logs.rows(FULL) if name != "uav"]
+    for cut, ignored in ((0, 0), (1, 0), (2, 1), (5, 1)):
+        (tmp_path / "a.csv").write_text("t,body,x,y\n" + "".join(rows)[: -cut or None])
+        found = logs.read(tmp_path / "a.csv", document)
+        assert len(found.bodies["tb_1"].t_s) == len(FULL["tb_1"][0]) - ignored
+        assert ("a.csv: lines with another number of fields, or cut off: 1, first line 63" in found.ignored) == ignored
+
+
 @pytest.mark.parametrize("write", WRITERS, ids=lambda write: write.__name__)
 def test_changed_bytes_end_in_a_line_or_in_a_verdict(
     write: Callable[[Path], Path], tmp_path: Path, document: dict[str, Any]
