@@ -149,6 +149,11 @@ def test_the_verdict_comes_first_with_margin_time_and_whose_doing_it_was(
     assert third == "5 of 6 distances were kept. The log has 6 of the scenario's 6 s, without gaps."
 
 
+def test_json_has_all_remarks(log: list[Path | str], airground: Airground) -> None:
+    found = json.loads(airground("judge", *log, "--json", "--set", "ugvs.tb_0.start_m=[-1.5,0,0]", code=1))
+    assert found["said"][-1].startswith("robots do not start as in the scenario: tb_0 by 0.5 m; if the log is in")
+
+
 def test_a_position_error_that_decides_is_exit_code_1(log: list[Path | str], airground: Airground) -> None:
     said = airground("judge", *log, "--position-error", "0.01", "--position-error", "uav=0", code=1)
     assert said.startswith("NOT ESTABLISHED (tb_0, tb_1): 0.28")

@@ -477,5 +477,5 @@ def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
     return {
         "status": judged.status, "covered": covered, "pairs": pairs, "bodies": bodies,
         "speeds_m_s": {name: list(both) for name, both in judged.speeds_m_s.items()}, "starts_away_m": judged.away_m,
-        "said": tracks.remarks, "not_used": tracks.ignored, "not_judged": list(judged.not_judged),
+        "not_used": tracks.ignored, "not_judged": list(judged.not_judged),
     }  # fmt: skip
