@@ -196,11 +196,13 @@ def test_a_map_is_as_wide_as_others_and_its_ways_cut_no_corners(tmp_path: Path, 
     assert len(drawn) < 0.5 * len(laps)
     t_s = np.arange(0.0, 60.0, 0.5)
     corridor = {
-        name: (t_s, np.stack([0.0 * t_s + x, t_s, 0.0 * t_s], axis=1)) for name, x in (("tb_0", 0.0), ("tb_1", 2.0))
+        name: (t_s, np.stack([0.0 * t_s + x, t_s + 5e6, 0.0 * t_s], axis=1))
+        for name, x in (("tb_0", 0.0), ("tb_1", 2.0))
     }
     (tmp_path / "corridor.csv").write_text(logs.text(logs.long(corridor)))
     scenario = logs.write_scenario(tmp_path, obstacles={})
     airground("judge", tmp_path / "corridor.csv", "--scenario", scenario, "-o", tmp_path / "judged")
+    assert [path.name for path in (tmp_path / "judged").iterdir()] == ["judged.html"]  # no replay far from the scenario
     assert '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 432 ' in (tmp_path / "judged/judged.html").read_text()
 
 

@@ -128,6 +128,7 @@ class Judged(NamedTuple):
     stray_m: float  # how far a robot can be from that straight line at its speed limit
     speeds_m_s: dict[str, tuple[float, float]]  # largest speed of each robot in the log, and its limit
     away_m: dict[str, float]  # distance of each robot's start from its start in the scenario
+    is_far: bool  # whether all robots start far from the scenario
     by_scenario: bool  # whether distances to obstacles at rest are judged, whose places are the scenario's
     not_judged: tuple[str, ...]
 
@@ -166,7 +167,9 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
         raise LogError(f"no distance is left to judge: of {', '.join(bodies)} nothing else is in the log or scenario")
     to_rest = [pair.least_m for pair in pairs if pair.second not in {*bodies}]
     places = [ugv[key][:2] for ugv in scenario["ugvs"].values() for key in ("start_m", "target_m")]
-    if to_rest and away and min(*to_rest, *away.values()) > FAR * max(1.0, float(np.ptp(places, axis=0).max())):
+    far_m = FAR * max(1.0, float(np.ptp(places, axis=0).max()))
+    is_far = min(away.values(), default=0.0) > far_m
+    if is_far and min(to_rest, default=0.0) > far_m:
         raise LogError(
             f"{next(iter(away))} starts {next(iter(away.values())):.3g} m from its start in the scenario, and no robot "
             "comes near an obstacle: the log is in another frame; wanted: positions in the scenario's frame, or a "
@@ -182,6 +185,7 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
         stray_m=stray,
         speeds_m_s=speeds,
         away_m=away,
+        is_far=is_far,
         by_scenario=bool(to_rest),
         not_judged=(*NOT_JUDGED, *((NOT_JUDGED_OF_OLD,) if is_asynchronous(scenario) else ())),
     )

@@ -38,7 +38,7 @@ def write(
     folder: Path, judged: Judged, tracks: Tracks, scenario: Scenario, errors_m: Mapping[str, float], logs: Sequence[str]
 ) -> list[Path]:
     pages = {}
-    if judged.end_s - judged.begin_s <= LONGEST_REPLAY_S:
+    if judged.end_s - judged.begin_s <= LONGEST_REPLAY_S and not judged.is_far:  # it would show targets, too
         pages[REPLAY] = replay_page(scene(judged, tracks, scenario, logs))
     pages[PAGE] = page(judged, tracks, scenario, errors_m, logs, REPLAY if pages else "")
     for name, text in pages.items():
