@@ -180,9 +180,9 @@ def rule(axes: Axes, x: str, y: str, log: str = "", numbers: Mapping[float, str]
     width_in, height_in = size_in(axes)
     axes.set_xticks([])
     axes.set_yticks([])
-    from_x, from_y = 0.0 if numbers else _origin(axes.get_xlim()), _origin(axes.get_ylim())
-    x, y = _from(x, from_x), _from(y, from_y)
+    from_y, y = _counted_from(axes.get_ylim(), y)
     if numbers is None:
+        from_x, x = _counted_from(axes.get_xlim(), x)
         numbers = {at: _number(at - from_x, log="x" in log) for at in ticks_of(axes.get_xlim(), 6, whole="x" in log)}
     across = axes.get_xaxis_transform()
     axes.vlines(list(numbers), 0.0, 1.0, transform=across, **_GRID)
@@ -208,19 +208,16 @@ def ticks_of(limits: tuple[float, float], count: int, *, whole: bool = False) ->
     return [float(round(at, 12)) for at in ticks if low - slack <= at <= high + slack]
 
 
-def _origin(limits: tuple[float, float]) -> float:
-    """A round number near both limits if they are far from 0, else 0."""
+def _counted_from(limits: tuple[float, float], label: str) -> tuple[float, str]:
+    """A round number near both limits, if they are far from 0, else 0; and the label that says so."""
     low, high = limits
     if max(abs(low), abs(high)) < FAR * (high - low):
-        return 0.0
-    unit = 10.0 ** (math.ceil(math.log10(high - low)) + 1)
-    return unit * round((low + high) / 2.0 / unit)
-
-
-def _from(label: str, origin: float) -> str:
+        return 0.0, label
+    step = 10.0 ** (math.ceil(math.log10(high - low)) + 1)
+    origin = step * round((low + high) / 2.0 / step)
     what, comma, unit = label.partition(",")
     sign = "+" if origin < 0.0 else "\N{MINUS SIGN}"
-    return f"{what} {sign} {abs(origin):.12g}{comma}{unit}" if label and origin else label
+    return origin, f"{what} {sign} {abs(origin):.12g}{comma}{unit}" if label else ""
 
 
 def _number(at: float, *, log: bool) -> str:
