@@ -127,7 +127,7 @@ class Judged(NamedTuple):
     usual_s: float  # longest of the bodies' usual times between two samples
     stray_m: float  # how far a robot can be from that straight line at its speed limit
     speeds_m_s: dict[str, tuple[float, float]]  # largest speed of each robot in the log, and its limit
-    away_m: dict[str, float]  # distance of each robot's start from its start in the scenario
+    away_m: dict[str, float]  # distance of each start in the log from that in the scenario; none of late bodies
     is_far: bool  # whether all robots start far from the scenario
     by_scenario: bool  # whether distances to obstacles at rest are judged, whose places are the scenario's
     not_judged: tuple[str, ...]
@@ -159,8 +159,8 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
     speeds = {name: (_speed(bodies[name]), float(robot["max_speed_m_s"])) for name, robot in robots.items()}
     away = {
         name: float(np.linalg.norm((bodies[name].places_m[0] - np.array(robot["start_m"]))[:2]))
-        for name, robot in robots.items()
-    }
+        for name, robot in robots.items() if bodies[name].t_s[0] <= whole.begin + bodies[name].gap_s
+    }  # fmt: skip
     longest = {name: _longest(track) for name, track in bodies.items()}
     stray = max((0.5 * limit * longest[name] for name, (_, limit) in speeds.items()), default=0.0)
     if not pairs:

@@ -71,7 +71,7 @@ def doing(pair: JudgedPair) -> str:
 
 def law(pair: JudgedPair) -> str:
     if pair.missed_m <= SMALL:
-        held = f"the law held in all {pair.intervals} intervals"
+        held = f"the law held in all {pair.intervals} intervals" if pair.intervals else "no interval was recorded"
     else:
         who = ", ".join(f"{name} {missed_m:.3g} m" for name, missed_m in pair.missed_by_m.items() if missed_m > SMALL)
         by = f" ({who})" if len(pair.missed_by_m) > 1 and who else ""

@@ -176,6 +176,12 @@ def test_one_lost_row_is_no_gap_two_are_and_so_is_half_of_the_log(tmp_path: Path
     few = {**FULL, "tb_1": (FULL["tb_1"][0][:61:60], FULL["tb_1"][1][:61:60])}
     judged = judge(logs.read(written(tmp_path, logs.long(few)), document), document)
     assert pair_of(judged.pairs, *BROKEN).gaps_s == [(pytest.approx(3.0), pytest.approx(6.0))]
+    late = {**FULL, "tb_1": (FULL["tb_1"][0][60:61], FULL["tb_1"][1][60:61])}
+    judged = judge(found := logs.read(written(tmp_path, logs.long(late)), document), document)
+    text = "\n".join(lines(judged, found))
+    assert "tb_0, tb_1: NOT KEPT, 0.2856 m at 3.000 s" in text
+    assert "; covered 0 s; no interval was recorded: the safety theorem promises no distance" in text
+    assert "robots do not start as in the scenario" not in text
 
 
 def test_a_log_that_is_shorter_than_the_scenario_says_so(tmp_path: Path, document: dict[str, Any]) -> None:
