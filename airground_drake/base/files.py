@@ -13,7 +13,7 @@ import re
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import chain
 from pathlib import Path
@@ -88,10 +88,10 @@ def read_text(path: Path) -> str:
     return read_bytes(path, LARGEST_TEXT).decode()
 
 
-def read_table(content: bytes, *, others: bool = False) -> pd.DataFrame:
+def read_table(content: bytes, left_out: dict[str, str] | None = None) -> pd.DataFrame:
     """The table in a Parquet file that may be hostile: numbers, texts and lists of numbers."""
-    # With `others`, as programs other than this one write them, also times and categories of texts; an index that was
-    # kept becomes the first columns.
+    # left_out: for a file of another program; gets columns that are not read, with their types. Times are read there,
+    # too, and no lists; parts of structures are columns, and so is an index that was kept.
     #
     # The declared types and sizes are checked before the file is unpacked. A few bytes may stand for a long text in a
     # million rows, so texts are counted before they are copied into their rows.
@@ -100,29 +100,44 @@ def read_table(content: bytes, *, others: bool = False) -> pd.DataFrame:
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
-    numbers = [pa.types.is_floating, pa.types.is_integer, pa.types.is_boolean, pa.types.is_null]
-    text_types = [pa.string(), pa.large_string()]
-    if others:
-        numbers.append(pa.types.is_timestamp)
-        text_types += [pa.dictionary(index, pa.string()) for index in (pa.int8(), pa.int16(), pa.int32())]
+    types, is_ours = pa.types, left_out is None
+    numbers = [types.is_floating, types.is_integer, types.is_boolean, types.is_null]
+    numbers += [] if is_ours else [types.is_decimal, types.is_timestamp, types.is_duration]
+
+    def columns(fields: Iterable[Any], above: str = "") -> Iterator[tuple[str, Any]]:
+        for field in fields:
+            name, kind = f"{above}{field.name}", field.type
+            kind = kind.value_type if types.is_dictionary(kind) and not is_ours else kind
+            yield from columns(kind, f"{name}.") if types.is_struct(kind) and not is_ours else [(name, kind)]
+
+    def read(names: list[str], coded: Sequence[str] = ()) -> Any:
+        table = pq.ParquetFile(io.BytesIO(content), read_dictionary=coded).read(columns=names)
+        while any(map(types.is_struct, table.schema.types)):
+            table = table.flatten()
+        return table.select(names)
+
     try:
         file = pq.ParquetFile(io.BytesIO(content))
-        schema, about = file.schema_arrow, file.metadata
-        texts = [field.name for field in schema if field.type in text_types]
-        for field in schema:
-            kind = field.type.value_type if pa.types.is_list(field.type) else field.type
-            if not (field.name in texts or any(is_kind(kind) for is_kind in numbers)):
-                raise ValueError(f"column {field.name!r} is of type {field.type}")
+        about, kinds = file.metadata, dict(columns(file.schema_arrow))
+        texts = [name for name, kind in kinds.items() if kind in (pa.string(), pa.large_string(), pa.string_view())]
+        for name, kind in [*kinds.items()]:
+            plain = kind.value_type if types.is_list(kind) and is_ours else kind
+            if name in texts or any(is_kind(plain) for is_kind in numbers):
+                continue
+            if left_out is None:
+                raise ValueError(f"column {name!r} is of type {kind}")
+            left_out[name] = str(kinds.pop(name))
+        outer = {name.split(".")[0] for name in kinds}
         chunks = [about.row_group(i).column(j) for i in range(about.num_row_groups) for j in range(about.num_columns)]
-        _within("cells", max(about.num_rows * about.num_columns, sum(c.num_values for c in chunks)), MOST_CELLS)
+        chunks = [chunk for chunk in chunks if chunk.path_in_schema.split(".")[0] in outer]
+        _within("cells", max(about.num_rows * len(kinds), sum(c.num_values for c in chunks)), MOST_CELLS)
         _within("bytes", sum(c.total_uncompressed_size for c in chunks), MOST_UNPACKED)
-        if texts:
-            coded = pq.read_table(io.BytesIO(content), columns=texts, read_dictionary=texts)
-            parts = [part for column in coded.columns for part in column.chunks]
-            sizes = (pc.sum(pc.binary_length(part.dictionary).take(part.indices)).as_py() or 0 for part in parts)
-            _within("bytes of text", sum(sizes), MOST_UNPACKED)
-        table = pd.read_parquet(io.BytesIO(content))
-        return table.reset_index() if others and not isinstance(table.index, pd.RangeIndex) else table
+        parts = [part for column in read(texts, texts).columns for part in column.chunks] if texts else []
+        sizes = (pc.sum(pc.binary_length(part.dictionary).take(part.indices)).as_py() or 0 for part in parts)
+        _within("bytes of text", sum(sizes), MOST_UNPACKED)
+        if is_ours:
+            return pd.read_parquet(io.BytesIO(content))
+        return read([*kinds]).to_pandas(ignore_metadata=True, integer_object_nulls=True)
     except Exception as error:  # pyarrow raises many kinds
         raise ValueError(f"no table that can be used: {error}") from error
 

@@ -191,11 +191,11 @@ def foxglove(bodies: Motion, late_s: Mapping[str, float]) -> list[Said]:
     return sorted(found, key=lambda each: each[0])
 
 
-def mcap_json(path: Path, said: Iterable[Said], profile: str = "", chunk_size: int = 1_000_000) -> None:
+def mcap_json(path: Path, said: Iterable[Said], profile: str = "", **options: Any) -> None:
     from mcap.writer import Writer
 
     with path.open("wb") as file:
-        writer = Writer(file, chunk_size=chunk_size)
+        writer = Writer(file, **options)
         writer.start(profile=profile, library="a logger")
         channels: dict[str, int] = {}
         for received, topic, kind, content in said:

@@ -14,10 +14,11 @@ from builders import logs
 from commands.conftest import Airground
 
 from airground_drake.report.export import recording
+from airground_drake.report.view.plane import Frame
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
-from airground_drake.study.logs import judging
+from airground_drake.study.logs import judging, page
 
 Run = Callable[[str, str], Trace]
 BETWEEN_M = 5e-4
@@ -148,6 +149,11 @@ def test_the_verdict_comes_first_with_margin_time_and_whose_doing_it_was(
     assert third == "5 of 6 distances were kept. The log has 6 of the scenario's 6 s, without gaps."
 
 
+def test_json_has_all_remarks(log: list[Path | str], airground: Airground) -> None:
+    found = json.loads(airground("judge", *log, "--json", "--set", "ugvs.tb_0.start_m=[-1.5,0,0]", code=1))
+    assert found["said"][-1].startswith("robots do not start as in the scenario: tb_0 by 0.5 m; if the log is in")
+
+
 def test_a_position_error_that_decides_is_exit_code_1(log: list[Path | str], airground: Airground) -> None:
     said = airground("judge", *log, "--position-error", "0.01", "--position-error", "uav=0", code=1)
     assert said.startswith("NOT ESTABLISHED (tb_0, tb_1): 0.28")
@@ -179,6 +185,25 @@ def test_the_page_of_a_log_with_gaps_draws_none_of_them(tmp_path: Path, airgroun
     assert "No distance was broken where the log covers it." in page
     assert "not recorded, tb_1, for 1.20 s" in replay
     assert "UGV: own task" not in replay  # a log does not say so
+
+
+def test_a_map_is_as_wide_as_others_and_its_ways_cut_no_corners(tmp_path: Path, airground: Airground) -> None:
+    t_s = np.arange(0.0, 6000.0, 0.5)  # 200 laps
+    laps = 2.0 * np.stack([np.cos(0.21 * t_s), np.sin(0.21 * t_s)], axis=1)
+    drawn = page._drawn(laps, Frame(-2.0, 2.0, -2.0, 2.0))
+    assert np.nanmax(np.hypot(*np.diff(drawn, axis=0).T)) < 0.25
+    assert np.nanmin(np.hypot(*drawn.T)) > 1.99
+    assert len(drawn) < 0.5 * len(laps)
+    t_s = np.arange(0.0, 60.0, 0.5)
+    corridor = {
+        name: (t_s, np.stack([0.0 * t_s + x, t_s + 5e6, 0.0 * t_s], axis=1))
+        for name, x in (("tb_0", 0.0), ("tb_1", 2.0))
+    }
+    (tmp_path / "corridor.csv").write_text(logs.text(logs.long(corridor)))
+    scenario = logs.write_scenario(tmp_path, obstacles={})
+    airground("judge", tmp_path / "corridor.csv", "--scenario", scenario, "-o", tmp_path / "judged")
+    assert [path.name for path in (tmp_path / "judged").iterdir()] == ["judged.html"]  # no replay far from the scenario
+    assert '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 432 ' in (tmp_path / "judged/judged.html").read_text()
 
 
 @pytest.mark.parametrize(

@@ -210,6 +210,14 @@ def test_thinning_keeps_ends_and_extremes() -> None:
     assert len(canvas.thin(values[:100])) == 100
 
 
+def test_numbers_far_from_0_count_from_one_that_the_label_states() -> None:
+    axes = matplotlib.figure.Figure().add_axes((0.2, 0.2, 0.6, 0.6))
+    axes.set(xlim=(499_999.9, 500_000.8), ylim=(-4_801.0, -4_799.0))
+    canvas.rule(axes, "x, m", "y, m")
+    texts = {text.get_text() for text in axes.texts}
+    assert {"x \N{MINUS SIGN} 500000, m", "y + 4800, m", "0", "0.2", "0.6", "1"} <= texts
+
+
 STYLE = "fill: #123456; font: 700 9px 'A', sans-serif; text-anchor: middle; background: url(http://e); x: y"
 SOURCE = (
     '<?xml version="1.0"?><svg xmlns="http://www.w3.org/2000/svg" xmlns:x="http://www.w3.org/1999/xlink" '

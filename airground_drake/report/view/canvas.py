@@ -1,6 +1,7 @@
 """Shared by all figures: looks that do not rely on colour, labels beside the data, reproducible SVG."""
 
 import io
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -14,6 +15,8 @@ from matplotlib.ticker import MaxNLocator
 from airground_drake.base.arrays import Array, Flags, Indices
 
 MAX_POINTS = 600  # maximum number of points of a line: two per pixel of a panel
+
+FAR = 1_000.0  # limits of an axis are far from 0 if they are so many times larger than what is between them
 
 # Smallest width of a histogram, relative and absolute: floating point divides it, and numbers on its axis differ.
 NARROWEST, LEAST = 1e-4, 1e-3
@@ -172,13 +175,15 @@ def spread(places: Sequence[float], gap: float) -> list[float]:
 def rule(axes: Axes, x: str, y: str, log: str = "", numbers: Mapping[float, str] | None = None) -> None:
     """Draw grid lines, numbers and axis labels, once the limits are set; an empty label leaves the numbers out."""
     # Values on the axes named in `log` are logarithms to base 10; the numbers show what they are the logarithms of.
-    # `numbers`, by their places, replace those across. These are few artists: matplotlib's own ticks would take nearly
-    # half of the drawing time.
+    # `numbers`, by their places, replace those across. Far from 0, numbers count from a round one in the label. These
+    # are few artists: matplotlib's own ticks would take nearly half of the drawing time.
     width_in, height_in = size_in(axes)
     axes.set_xticks([])
     axes.set_yticks([])
+    from_y, y = _counted_from(axes.get_ylim(), y)
     if numbers is None:
-        numbers = {at: _number(at, log="x" in log) for at in ticks_of(axes.get_xlim(), 6, whole="x" in log)}
+        from_x, x = _counted_from(axes.get_xlim(), x)
+        numbers = {at: _number(at - from_x, log="x" in log) for at in ticks_of(axes.get_xlim(), 6, whole="x" in log)}
     across = axes.get_xaxis_transform()
     axes.vlines(list(numbers), 0.0, 1.0, transform=across, **_GRID)
     for at, written in numbers.items() if x else ():
@@ -190,7 +195,7 @@ def rule(axes: Axes, x: str, y: str, log: str = "", numbers: Mapping[float, str]
     up = axes.get_yaxis_transform()
     axes.hlines(rows, 0.0, 1.0, transform=up, **_GRID)
     for at in rows:
-        written = _number(at, log="y" in log)
+        written = _number(at - from_y, log="y" in log)
         axes.text(-0.05 / width_in, at, written, transform=up, ha="right", va="center", **_NUMBERS)
     axes.text(-0.36 / width_in, 0.5, y, transform=axes.transAxes, ha="right", va="center", rotation=90)
 
@@ -201,6 +206,18 @@ def ticks_of(limits: tuple[float, float], count: int, *, whole: bool = False) ->
     slack = 1e-9 * (high - low)
     ticks = MaxNLocator(count, steps=[1, 2, 5, 10], integer=whole).tick_values(low, high)
     return [float(round(at, 12)) for at in ticks if low - slack <= at <= high + slack]
+
+
+def _counted_from(limits: tuple[float, float], label: str) -> tuple[float, str]:
+    """A round number near both limits, if they are far from 0, else 0; and the label that says so."""
+    low, high = limits
+    if max(abs(low), abs(high)) < FAR * (high - low):
+        return 0.0, label
+    step = 10.0 ** (math.ceil(math.log10(high - low)) + 1)
+    origin = step * round((low + high) / 2.0 / step)
+    what, comma, unit = label.partition(",")
+    sign = "+" if origin < 0.0 else "\N{MINUS SIGN}"
+    return origin, f"{what} {sign} {abs(origin):.12g}{comma}{unit}" if label else ""
 
 
 def _number(at: float, *, log: bool) -> str:

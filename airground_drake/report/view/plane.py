@@ -49,12 +49,12 @@ class Frame(NamedTuple):
         axes.set(xlim=(self.left, self.right), ylim=(self.bottom, self.top), aspect="equal")
 
 
-def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]]) -> Frame:
+def frame_of(scenario: Scenario, ways: Iterable[tuple[str, Array]], *, targets: bool = True) -> Frame:
     """The rectangle around the ways (T, 3), m, of robots, by name, their targets, the arena, and safe outlines."""
     points = list[Array]()
     for name, way in ways:
         points += [way[:, :2] + side * scenario.robots[name].radius_m for side in (-1.0, 1.0)]
-        points += [np.array([scenario.ugvs[name].target_m[:2]])] if name in scenario.ugvs else []
+        points += [np.array([scenario.ugvs[name].target_m[:2]])] if targets and name in scenario.ugvs else []
     travelled = np.concatenate(points)
     low, high = travelled.min(axis=0), travelled.max(axis=0)
     around = float((high - low).max())  # a map may reach far beyond what robots can

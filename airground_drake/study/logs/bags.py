@@ -119,11 +119,11 @@ def _of_mcap(file: BinaryIO) -> Iterator[Message]:
 
     size = os.fstat(file.fileno()).st_size
     unpacker, schemas, channels = Unpacker(size), dict[int, Schema](), dict[int, Channel]()
-    for record in StreamReader(file, emit_chunks=True, record_size_limit=size).records:
+    for record in StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size).records:
         inner = [record]
         if isinstance(record, Chunk):
             data = unpacker.unpacked(record.data, record.compression) if record.compression else record.data
-            inner = breakup_chunk(replace(record, compression="", data=data))
+            inner = breakup_chunk(replace(record, compression="", data=data), validate_crc=True)
         for part in inner:
             if isinstance(part, Schema):
                 schemas[part.id] = part
@@ -247,6 +247,9 @@ def _of_ros1(path: Path, size: int) -> Iterator[Message]:
 
 def _of_db3(path: Path) -> Iterator[Message]:
     """The messages of a .db3 file, in the order of their receipt; files beside it are not opened."""
+    for beside in (Path(f"{path}-wal"), Path(f"{path}-journal")):  # of a recorder that was killed
+        if beside.exists() and beside.stat().st_size:
+            raise LogError(f"{beside.name} beside it has messages that it lacks; wanted: sqlite3 {path.name} VACUUM")
     base = sqlite3.connect(f"file:{quote(str(path))}?mode=ro&immutable=1", uri=True)
     with closing(base):
         base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, files.LARGEST_FILE)  # a column may be made up by a formula
@@ -263,6 +266,8 @@ def _of_db3(path: Path) -> Iterator[Message]:
         }
         sql = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp"
         for number, received_ns, raw in base.execute(sql):
+            if number not in channels:
+                raise LogError("it is damaged: a message has no topic")
             yield channels[number], received_ns, raw
 
 

@@ -19,6 +19,11 @@ WORDS = {
     "usec": "us", "microseconds": "us", "\u00b5s": "us", "\u03bcs": "us", "nsec": "ns", "nanosec": "ns",
     "nanoseconds": "ns",
 }  # fmt: skip
+# Units that are not read.
+OTHER_UNITS = (
+    "ft", "foot", "feet", "in", "inch", "inches", "yd", "yard", "yards", "km", "dm", "um", "\u00b5m", "\u03bcm", "nm",
+    "deg", "degrees", "rad", "px", "pixel", "pixels", "min", "mins", "minutes", "h", "hr", "hrs", "hours", "days",
+)  # fmt: skip
 # Names of a column with the name of each row's body.
 BODIES = (
     "body", "robot", "robot_name", "robot_id", "name", "agent", "agent_id", "vehicle", "model", "model_name", "object",
@@ -39,6 +44,7 @@ COUNTERS = (
 )  # fmt: skip
 TARGETS = ("t", "body", "frame", "x", "y", "z")  # targets of `--map-columns`
 listed = partial(some, most=12)  # columns in a message
+_WORDS = re.compile(r"[A-Z]?[^\W_A-Z]+|[A-Z]+(?![a-z])")  # in a name: east_mm, eastMm, EAST [mm]
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 _SUFFIX = re.compile(r"(.+?)\s*[_/]\s*(mm|cm|m|s|ms|us|ns|secs?|seconds|msec|usec|nsec)", re.IGNORECASE)
 _AXIS = re.compile(r"(?:(.*?)[/._\s:|-])?(?:(?:t|p|pos|position|pose|translation)_?)?([xyz])", re.IGNORECASE)
@@ -159,16 +165,31 @@ def counts_frames(label: str) -> bool:
 def _mapped(labels: Sequence[str], chosen: Mapping[str, str]) -> tuple[list[str], dict[int, str]]:
     """The labels, with standard ones for columns named by `--map-columns`, and these by number."""
     renamed, mapped = list(labels), dict[int, str]()
-    for target, pattern in chosen.items():
+    for option, pattern in chosen.items():
+        target = _with_unit(option, pattern)
         names = [re.escape(part) for part in pattern.split("{body}")]
         matching = re.compile(r"(?P<body>.+)".join(names[:2]) if len(names) > 1 else names[0])
         hits = [(k, hit) for k, label in enumerate(labels) if (hit := matching.fullmatch(label))]
         if not hits:
-            raise LogError(f"--map-columns {target}={pattern}: there is no such column; there are {listed(labels)}")
+            raise LogError(f"--map-columns {option}={pattern}: there is no such column; there are {listed(labels)}")
         for k, hit in hits:
             renamed[k] = f"{hit['body']}.{target}" if len(names) > 1 else target
-            mapped[k] = f"{target}={pattern}"
+            mapped[k] = f"{option}={pattern}"
     return renamed, mapped
+
+
+def _with_unit(target: str, pattern: str) -> str:
+    """The target of a mapped column, with the unit that the column's name states; LogError for another unit there."""
+    (content, chosen), words = split_unit(target), _WORDS.findall(pattern)
+    unit = WORDS.get(words[-1].lower(), words[-1].lower()) if len(words) > 1 else ""
+    if content in ("body", "frame") or unit not in (*PER_M, *PER_S, *OTHER_UNITS):
+        return target
+    units = PER_S if content == "t" else PER_M
+    if unit not in units or chosen not in ("", unit):
+        wanted = f"{content}_{unit}={pattern}" if unit in units else f"a column in {', '.join(units)}"
+        says = f"the name of that column says {unit!r}; wanted: {wanted}; if its name is wrong, rename it"
+        raise LogError(f"--map-columns {target}={pattern}: {says}")
+    return f"{content}_{unit}"
 
 
 def _last(label: str) -> str:

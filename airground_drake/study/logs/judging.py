@@ -34,7 +34,7 @@ from airground_drake.check.scenario import (
     written,
 )
 from airground_drake.check.shapes import Shape
-from airground_drake.study.logs.tracks import Span, Track, Tracks, height_m
+from airground_drake.study.logs.tracks import Span, Track, Tracks, height_m, joint
 
 # Whether a distance was kept where the log covers it; open: the position error decides.
 KEPT, BROKEN, OPEN = "kept", "NOT KEPT", "open"
@@ -42,8 +42,12 @@ LAST_S = 1.0  # time before the least distance over which approaches are attribu
 STEPS = 100  # number of parts of that time in which both motions are separated
 STAMP_S = 2e-9  # accuracy of the time between two stamps
 HALVINGS = 60  # halvings of an interval in the search for a time
-# Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this.
+# Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this. A body
+# may begin later than the log, or end earlier, by no more, either.
 MOST_SPARE = 0.05
+# Robots that are always farther from their starts, and from obstacles, than so many times the scenario's size are in
+# another frame.
+FAR = 3.0
 NOT_JUDGED = (
     "motion between two samples: it is taken as straight",
     "places of obstacles at rest, walls and maps: the scenario's are taken",
@@ -123,7 +127,9 @@ class Judged(NamedTuple):
     usual_s: float  # longest of the bodies' usual times between two samples
     stray_m: float  # how far a robot can be from that straight line at its speed limit
     speeds_m_s: dict[str, tuple[float, float]]  # largest speed of each robot in the log, and its limit
-    away_m: dict[str, float]  # distance of each robot's start from its start in the scenario
+    away_m: dict[str, float]  # distance of each start in the log from that in the scenario; none of late bodies
+    is_far: bool  # whether all robots start far from the scenario
+    by_scenario: bool  # whether distances to obstacles at rest are judged, whose places are the scenario's
     not_judged: tuple[str, ...]
 
     @property
@@ -153,12 +159,22 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
     speeds = {name: (_speed(bodies[name]), float(robot["max_speed_m_s"])) for name, robot in robots.items()}
     away = {
         name: float(np.linalg.norm((bodies[name].places_m[0] - np.array(robot["start_m"]))[:2]))
-        for name, robot in robots.items()
-    }
+        for name, robot in robots.items() if bodies[name].t_s[0] <= whole.begin + bodies[name].gap_s
+    }  # fmt: skip
     longest = {name: _longest(track) for name, track in bodies.items()}
     stray = max((0.5 * limit * longest[name] for name, (_, limit) in speeds.items()), default=0.0)
     if not pairs:
         raise LogError(f"no distance is left to judge: of {', '.join(bodies)} nothing else is in the log or scenario")
+    to_rest = [pair.least_m for pair in pairs if pair.second not in {*bodies}]
+    places = [ugv[key][:2] for ugv in scenario["ugvs"].values() for key in ("start_m", "target_m")]
+    far_m = FAR * max(1.0, float(np.ptp(places, axis=0).max()))
+    is_far = min(away.values(), default=0.0) > far_m
+    if is_far and min(to_rest, default=0.0) > far_m:
+        raise LogError(
+            f"{next(iter(away))} starts {next(iter(away.values())):.3g} m from its start in the scenario, and no robot "
+            "comes near an obstacle: the log is in another frame; wanted: positions in the scenario's frame, or a "
+            "scenario without obstacles and map"
+        )
     return Judged(
         pairs=sorted(pairs, key=lambda pair: pair.margin_m),
         begin_s=whole.begin,
@@ -169,6 +185,8 @@ def judge(tracks: Tracks, scenario: Json, errors_m: Mapping[str, float] | None =
         stray_m=stray,
         speeds_m_s=speeds,
         away_m=away,
+        is_far=is_far,
+        by_scenario=bool(to_rest),
         not_judged=(*NOT_JUDGED, *((NOT_JUDGED_OF_OLD,) if is_asynchronous(scenario) else ())),
     )
 
@@ -270,7 +288,8 @@ def _judged(
         below += _below(pair.shape, apart, t_s, pair.safe_m - SMALL)
         law.add(t_s, own_m, other_m)
     body = barriers_of(scenario).get(pair.other)
-    gaps = _gaps(spans, _there(body, whole) if body else whole, own, other)
+    spare_s = MOST_SPARE * float(scenario["duration_s"])
+    gaps = _gaps(spans, _there(body, whole) if body else whole, own, other, spare_s)
     too_fast = _too_fast(other, scenario, pair, errors_m.get(pair.other, 0.0))
     promised = pair.gap_m - law.deficit - eps
     return JudgedPair(
@@ -386,14 +405,14 @@ def _below(shape: Shape, apart: Array, t_s: Array, need_m: float) -> list[Span]:
     return below_s
 
 
-def _gaps(spans: list[Span], whole: Span, own: Track, other: Track) -> list[Span]:
-    """Gaps between stretches with both bodies recorded, and at the ends if longer than usual."""
+def _gaps(spans: list[Span], whole: Span, own: Track, other: Track, spare_s: float) -> list[Span]:
+    """Gaps between stretches with both bodies recorded, and at the ends if longer than usual or than `spare_s`."""
     edges = [whole.begin, *(edge for span in spans for edge in span), whole.end]
     gaps = [Span(*both) for both in zip(edges[::2], edges[1::2], strict=True)]
     inner = [gap for gap in gaps[1:-1] if gap.end > gap.begin]
-    late = max(track.t_s[0] - whole.begin - track.gap_s * (1.0 + 1e-9) for track in (own, other))
-    early = max(whole.end - track.t_s[-1] - track.gap_s * (1.0 + 1e-9) for track in (own, other))
-    return sorted([*inner, *(gap for gap, lacks in ((gaps[0], late), (gaps[-1], early)) if lacks > 0.0)])
+    late = max(track.t_s[0] - whole.begin - min(track.gap_s, spare_s) * (1.0 + 1e-9) for track in (own, other))
+    early = max(whole.end - track.t_s[-1] - min(track.gap_s, spare_s) * (1.0 + 1e-9) for track in (own, other))
+    return joint(sorted([*inner, *(gap for gap, lacks in ((gaps[0], late), (gaps[-1], early)) if lacks > 0.0)]))
 
 
 def _came(pair: Pair, own: Track, other: Track, span: Span) -> dict[str, float]:
@@ -462,5 +481,5 @@ def as_json(judged: Judged, tracks: Tracks) -> dict[str, Any]:
     return {
         "status": judged.status, "covered": covered, "pairs": pairs, "bodies": bodies,
         "speeds_m_s": {name: list(both) for name, both in judged.speeds_m_s.items()}, "starts_away_m": judged.away_m,
-        "said": tracks.remarks, "not_used": tracks.ignored, "not_judged": list(judged.not_judged),
+        "not_used": tracks.ignored, "not_judged": list(judged.not_judged),
     }  # fmt: skip

@@ -1,8 +1,8 @@
 """A judged log as a page: verdict, map, distances over time, results of each pair; and a replay."""
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ from airground_drake.report.replay.scene import DrawnBody, Scene, frame_times
 from airground_drake.report.view import canvas
 from airground_drake.report.view.canvas import ALARM, INK, Look, label_right, level, look, rule, short, time_line
 from airground_drake.report.view.labels import Label, place
-from airground_drake.report.view.plane import axes_over, draw_barriers, frame_of, looks_of
+from airground_drake.report.view.plane import Frame, axes_over, draw_barriers, frame_of, looks_of
 from airground_drake.report.view.stage import Robot, stage
 from airground_drake.scenario.load import resolved
 from airground_drake.scenario.schema import Scenario
@@ -29,6 +29,7 @@ from airground_drake.study.logs.tracks import Track, Tracks
 PAGE, REPLAY = "judged.html", "replay.html"
 MOST_PANELS, MOST_ROWS = 6, 500  # pairs with a drawing of their distance, and pairs in the table; `--json` has all
 NEAR = 2.0  # a pair came near if its least distance is below this multiple of the required one
+CELLS = 400  # parts of a map's larger side within which a step is not drawn
 LONGEST_REPLAY_S = 1200.0  # of a longer log there is no replay: its page would be too large
 _MAP_IN, _PANEL_IN, _HEIGHT_IN = 6.0, 7.5, 2.1
 
@@ -37,7 +38,7 @@ def write(
     folder: Path, judged: Judged, tracks: Tracks, scenario: Scenario, errors_m: Mapping[str, float], logs: Sequence[str]
 ) -> list[Path]:
     pages = {}
-    if judged.end_s - judged.begin_s <= LONGEST_REPLAY_S:
+    if judged.end_s - judged.begin_s <= LONGEST_REPLAY_S and not judged.is_far:  # it would show targets, too
         pages[REPLAY] = replay_page(scene(judged, tracks, scenario, logs))
     pages[PAGE] = page(judged, tracks, scenario, errors_m, logs, REPLAY if pages else "")
     for name, text in pages.items():
@@ -64,16 +65,16 @@ def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
     """The ways of all bodies; nothing is drawn where one was not recorded."""
     known = {name: name if name in scenario.robots else next(iter(scenario.aerial)) for name in tracks.bodies}
     robots = [name for name in tracks.bodies if name not in scenario.obstacles]
-    frame = frame_of(scenario, [(known[name], tracks.bodies[name].places_m) for name in robots])
-    figure, axes = axes_over(frame, frame.width_in(_MAP_IN, canvas.TALLEST_IN))
+    frame = frame_of(scenario, [(known[name], tracks.bodies[name].places_m) for name in robots], targets=False)
+    figure, axes = axes_over(frame, frame.width_in(_MAP_IN, canvas.TALLEST_IN), _MAP_IN)
     of_barriers, edges = draw_barriers(axes, scenario, moving=False)
     looks = looks_of(scenario, [name for name in robots if name in scenario.ugvs])
     labels, ways = list[Label](), list[Array]()
     for name, track in tracks.bodies.items():
         appearance = looks.get(known[name], canvas.UAV_LOOK) if name in robots else Look(INK, (0, (1.0, 1.5)), "h")
-        parts = _parts(track)
+        parts = [track.places_m[(track.t_s >= span.begin) & (track.t_s <= span.end), :2] for span in track.spans]
         for part in parts:
-            axes.plot(*part.T, color=appearance.color, linestyle=appearance.dash)
+            axes.plot(*_drawn(part, frame).T, color=appearance.color, linestyle=appearance.dash)
         axes.plot(*track.places_m[0, :2], "o", markersize=6, color=appearance.color, markerfacecolor="white", zorder=4)
         axes.plot(*track.places_m[-1, :2], "s", markersize=5, color=appearance.color, zorder=4)
         labels += [Label(track.places_m[-1], short(name, 12), appearance.color, weight="bold")]
@@ -94,10 +95,18 @@ def _map(judged: Judged, tracks: Tracks, scenario: Scenario) -> Figure:
     return Figure("map", "Where they were", says + " Crosses in red: where a broken distance was least.", (drawn,))
 
 
-def _parts(track: Track) -> list[Array]:
-    """Its path in each stretch, seen from above: (K, 2) each, m, thinned for drawing."""
-    parts = [track.places_m[(track.t_s >= span.begin) & (track.t_s <= span.end), :2] for span in track.spans]
-    return [part[canvas.thin(part)] for part in parts]
+def _drawn(way_m: Array, frame: Frame) -> Array:
+    """A way (K, 2), m, as it is drawn; a row of nan stands where it repeats what is drawn already."""
+    # Of a long log, rows at equal distances in time would cut corners, and the ways would lead through obstacles.
+    if len(way_m) <= canvas.MAX_POINTS:
+        return way_m
+    cells = np.round(way_m * (CELLS / max(frame.right - frame.left, frame.top - frame.bottom)))
+    moves = np.append(True, np.diff(cells, axis=0).any(axis=1))
+    at = np.unique(cells[moves], axis=0, return_inverse=True)[1].reshape(-1)
+    new = np.zeros(len(at) - 1, dtype=bool)
+    new[np.unique(np.sort(np.stack([at[:-1], at[1:]], axis=1), axis=1), axis=0, return_index=True)[1]] = True
+    kept = np.append(new, False) | np.append(False, new)
+    return np.where(kept[:, None], way_m[moves], np.nan)[kept | np.append(True, kept[:-1])]
 
 
 def _distances(judged: Judged, tracks: Tracks, scenario: Json) -> list[Figure]:
@@ -123,8 +132,8 @@ def _distances(judged: Judged, tracks: Tracks, scenario: Json) -> list[Figure]:
 
 def _distance(axes: Axes, pair: JudgedPair, course: Sequence[tuple[Array, Array]], judged: Judged) -> None:
     distances_m = np.concatenate([values for _, values in course])
-    bottom = min(0.0, pair.least_m)
     top = max(min(float(distances_m.max()), 4.0 * pair.safe_m), 1.3 * pair.safe_m)
+    bottom = min(0.0, pair.least_m)
     axes.set_xlim(judged.begin_s, max(judged.end_s, judged.begin_s + 1e-6))
     axes.set_ylim(bottom, top)
     axes.axhspan(bottom, pair.safe_m, **canvas.FORBIDDEN)
@@ -135,7 +144,8 @@ def _distance(axes: Axes, pair: JudgedPair, course: Sequence[tuple[Array, Array]
     for t_s, values in course:
         time_line(axes, t_s, values, appearance._replace(marker=""))
     color = ALARM if pair.status == BROKEN else INK
-    axes.plot(pair.at_s, pair.least_m, "o", markersize=9, markerfacecolor="none", markeredgewidth=1.6, color=color)
+    ring: Any = {"markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.6, "clip_on": False}
+    axes.plot(pair.at_s, pair.least_m, "o", **ring, color=color)
     rule(axes, "time, s", "distance, m")
     label_right(axes, [(pair.safe_m, f"required {pair.safe_m:.3g}", INK), (pair.least_m, f"{pair.least_m:.3f}", color)])
 
@@ -177,8 +187,8 @@ def scene(judged: Judged, tracks: Tracks, scenario: Scenario, logs: Sequence[str
         for pair in judged.pairs if pair.status == BROKEN for span in pair.below_s
     ]  # fmt: skip
     events += [
-        {"t_s": end - judged.begin_s, "kind": "not recorded", "robot": f"{name}, for {begin - end:.2f} s"}
-        for name, track in tracks.bodies.items() for (_, end), (begin, _) in pairwise(track.spans)
+        {"t_s": gap.begin - judged.begin_s, "kind": "not recorded", "robot": f"{name}, for {gap.end - gap.begin:.2f} s"}
+        for name, track in tracks.bodies.items() for gap in track.gaps
     ]  # fmt: skip
     return Scene(
         **{**vars(still), "robots": tuple(bodies)}, scenario=scenario, run=", ".join(Path(log).name for log in logs),

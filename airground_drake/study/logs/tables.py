@@ -24,6 +24,7 @@ UNIT_LENGTH = 0.05  # the length of a quaternion differs from 1 by less
 MOST_BODIES = 2_000  # different values in a column that names bodies
 _UNITS = re.compile(r"length\W*units?\W+(\w+)", re.IGNORECASE)
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*")  # date and time of day
+_ELAPSED = re.compile(r"-?\d+ days [+-]?\d\d:\d\d:\d\d(\.\d+)?")
 _NOTHING = ("nan", "null", "none", "na", "n/a")
 _DECIMAL = re.compile(r"([+-]?)(\d{1,19})(?:\.(\d*))?")
 
@@ -63,17 +64,20 @@ def read(path: Path, content: bytes, wanted: Wanted) -> Log:
             "--map-columns t=NAME,body=NAME,x=NAME,y=NAME,z=NAME"
         )
     has = _of_bodies(has, table, wanted, path)
-    log = Log(list(_streams(path, table, has, wanted)))
     clocks = [clock_of(place, has.times, labels) for place in has.places]
     used = {k for place in has.places for k in (place.x, place.y, place.z)} | {has.body}
     used |= {k for time in clocks for k in (time.whole, time.rest)}
     used |= {has.frame} if _frames(table, has) is not None else set()
     has.refuse_unused(used)
+    for label in (label for k, label in enumerate(labels) if k in used and label in table.unread):
+        kind = table.unread[label]
+        raise LogError(f"column {label!r} is needed, and of type {kind}; wanted: numbers, texts, times or durations")
+    log = Log(list(_streams(path, table, has, wanted)))
     if others := [label or f"column {k + 1}" for k, label in enumerate(labels) if k not in used]:
         log.ignored.append(f"{path.name}: columns {listed(others)}")
     if table.odd:
         where = f"first line {table.odd[0]}"
-        log.ignored.append(f"{path.name}: lines with another number of fields: {len(table.odd)}, {where}")
+        log.ignored.append(f"{path.name}: lines with another number of fields, or cut off: {len(table.odd)}, {where}")
     return log
 
 
@@ -98,14 +102,18 @@ def _frames(table: text.Table, has: Columns) -> pd.Series | None:
 
 
 def _parquet(content: bytes) -> text.Table:
-    """A table of numbers, times and texts; ValueError as `files.read_table`."""
+    """A table of numbers, times and texts; columns of other types are empty."""
+    others = dict[str, str]()
     try:
-        table = files.read_table(content, others=True)
-    except ValueError as error:
+        table = files.read_table(content, others)
+        texts = {k: [*map(_written, table.iloc[:, k].tolist())] for k in range(table.shape[1])}
+    except (ValueError, OverflowError) as error:
         raise LogError(str(error)) from None
-    texts = {k: [*map(_written, table.iloc[:, k].tolist())] for k in range(table.shape[1])}
-    cells = pd.DataFrame(texts, dtype=str)
-    return text.Table([*map(str, table.columns)], cells, range(1, len(table) + 1), [], True, [])
+    cells = pd.DataFrame(texts | {table.shape[1] + k: "" for k in range(len(others))}, dtype=str, index=table.index)
+    labels = [*map(str, table.columns), *others]
+    if (index := "__index_level_0__") in table and table[index].dtype.kind in "mM":  # one without a name, with times
+        labels[labels.index(index)] = "__time"
+    return text.Table(labels, cells, range(1, len(table) + 1), [], True, [], others)
 
 
 def _written(value: Any) -> str:
@@ -217,13 +225,19 @@ def _places(table: text.Table, place: Place) -> tuple[Array, npt.NDArray[np.obje
 
 
 def _dated(table: text.Table, time: Time) -> Time:
-    """The time, and where it is written as a date, the cells as seconds since 1970."""
+    """The time; dates become seconds since 1970, and durations as pandas writes them become seconds."""
     cells = table.cells[time.whole]
-    if not _ISO.fullmatch(next(filter(None, cells), "")):
+    first = next(filter(None, cells), "")
+    moments: Any
+    if _ISO.fullmatch(first):
+        moments = pd.to_datetime(cells.str.replace(",", "."), utc=True, errors="coerce", format="ISO8601")
+        moments = moments.where(moments.dt.year.between(1678, 2261))  # 64 bits hold no others in nanoseconds
+    elif _ELAPSED.fullmatch(first):
+        moments = pd.to_timedelta(cells, errors="coerce")
+    else:
         return time
-    dates = pd.to_datetime(cells.str.replace(",", "."), utc=True, errors="coerce", format="ISO8601")
-    stamps = dates.dt.as_unit("ns").astype("int64").map(lambda ns: str(Decimal(ns).scaleb(-9)))
-    table.cells[time.whole] = stamps.where(dates.notna(), "")
+    stamps = moments.dt.as_unit("ns").astype("int64").map(lambda ns: str(Decimal(ns).scaleb(-9)))
+    table.cells[time.whole] = stamps.where(moments.notna(), "")
     return time._replace(unit="s")
 
 

@@ -8,7 +8,8 @@ import io
 import re
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import pandas as pd
@@ -22,6 +23,7 @@ ALIKE = 0.6  # least share of these lines that have the usual number of fields
 FEWEST, MOST = 3, 20_000  # columns of a table
 MOST_HEADERS = 20  # lines of a header
 MOST_ROWS = 10_000_000
+_UNKNOWN = "it is neither text nor a file of a known kind; wanted: CSV, TSV, TUM, Parquet, MCAP or a ROS bag"
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)|", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
@@ -36,7 +38,8 @@ class Table(NamedTuple):
     lines: Sequence[int]  # number of each row's line in the file
     above: list[str]  # lines above the header, and comments
     has_header: bool  # whether there was one
-    odd: list[int]  # numbers of the lines that have another number of fields, and are left out
+    odd: list[int]  # numbers of the lines that are left out: with another number of fields, or cut off
+    unread: Mapping[str, str] = MappingProxyType({})  # types of columns that are left out, by label
 
 
 def read(content: bytes) -> Table:
@@ -64,7 +67,10 @@ def read(content: bytes) -> Table:
     data = [k for k in full if k >= first]
     if len(data) > MOST_ROWS:
         raise LogError(f"it has {len(data)} rows; allowed: {MOST_ROWS}")
-    good = [k for k in data if _count(lines[k], delimiter) == count]
+    # A logger that crashes may cut off its last number: that has fewer digits than the one above it, and no line's end.
+    digits = [len(re.split(r"[.,;|\s]", line)[-1]) for line in lines[-2:]]
+    whole = len(lines) - (digits[-1] < digits[0])
+    good = [k for k in data if k < whole and _count(lines[k], delimiter) == count]
     chosen = set(good)
     try:
         with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):  # quotes joined lines
@@ -92,13 +98,13 @@ def _decoded(content: bytes) -> str:
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", errors="replace")
     if b"\0" in content:
-        raise LogError("it is neither text nor a file of a kind that is known here")
+        raise LogError(_UNKNOWN)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("cp1252", errors="replace")
     if sum(not (c.isprintable() or c in "\r\n\t") for c in text[:4096]) > 40:
-        raise LogError("it is neither text nor a file of a kind that is known here")
+        raise LogError(_UNKNOWN)
     return text
 
 

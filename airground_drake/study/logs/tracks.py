@@ -53,6 +53,13 @@ class Span(NamedTuple):
     end: float
 
 
+def joint(spans: Sequence[Span]) -> list[Span]:
+    """Stretches in the order of time; those that touch are one."""
+    begins = [span.begin for k, span in enumerate(spans) if not k or span.begin > spans[k - 1].end]
+    ends = [span.end for k, span in enumerate(spans) if k + 1 == len(spans) or spans[k + 1].begin > span.end]
+    return [Span(*both) for both in zip(begins, ends, strict=True)]
+
+
 @dataclass(eq=False)
 class Track:
     """Where one body was; n samples, strictly increasing in time."""
@@ -61,7 +68,8 @@ class Track:
     places_m: Array  # (n, 3); z is nan if the log lacks it
     gap_s: float  # motion between two samples that are farther apart is unknown
     origin: dict[str, str] = field(default_factory=dict)  # stream, frame and clock
-    leaps_s: tuple[float, ...] = ()  # times of samples that the body cannot have reached from the previous sample
+    # Times of samples that the body cannot have reached from the previous one, or that repeat a place before that.
+    leaps_s: tuple[float, ...] = ()
     usual_s: float = 0.0  # usual time between two samples
 
     @property
@@ -75,6 +83,11 @@ class Track:
         cut = np.flatnonzero(~self.is_known)
         begins, ends = self.t_s[np.append(0, cut + 1)], self.t_s[np.append(cut, len(self.t_s) - 1)]
         return [Span(*both) for both in zip(begins.tolist(), ends.tolist(), strict=True)]
+
+    @property
+    def gaps(self) -> list[Span]:
+        """Stretches of unknown motion between samples."""
+        return joint([Span(a.end, b.begin) for a, b in pairwise(self.spans)])
 
     def at(self, t_s: Array) -> Array:
         """Places at times (m,), with straight motion between samples: (m, 3), m."""
@@ -191,7 +204,8 @@ def joined(log: Log, scenario: Json, choice: Choice) -> Tracks:
 def _not_there(name: str, log: Log, choice: Choice) -> str:
     frames = sorted({stream.frame for stream in log.streams if stream.frame})
     if choice.frames and frames and not {*frames} & {*choice.frames}:
-        return f"--frame {choice.frames[0]}: the log has no such frame; it has {', '.join(frames)[:300]}"
+        there = ", ".join(frames)[:300]
+        return f"--frame {choice.frames[0]}: no position is in it, and transforms are not chained; frames: {there}"
     there = ", ".join(dict.fromkeys(stream.label for stream in log.streams))
     there = f"names there: {there[:300]}" if there else "no positions are there"
     of_it = [why for why in log.unusable if name in why]
@@ -342,20 +356,26 @@ def _track(
             f"{t_s[lost][0]:.6g} s"
         )
     t_s, places = t_s[~lost], places[~lost]
-    leaps = t_s[1:][_leaps(t_s, places, fastest_m_s)]
-    if len(leaps) > MOST_LEAPS * len(t_s):
+    leaps = _leaps(t_s, places, fastest_m_s)
+    count = int(leaps.sum())
+    says = f"{LOST:g} times faster than {fastest_m_s:g} m/s"
+    if count > MOST_LEAPS * len(t_s):
         raise LogError(
-            f"{name}: {len(leaps)} of {len(t_s) - 1} steps are more than {LOST:g} times faster than {fastest_m_s:g} "
-            "m/s; wanted: --length-unit, --time-unit, or a log of this robot"
+            f"{name}: {count} of {len(t_s) - 1} steps are more than {says}; wanted: --length-unit, --time-unit, or a "
+            "log of this robot"
         )
-    if len(leaps):
+    if count:
         remarks.append(
-            f"{name}: {len(leaps)} steps that are more than {LOST:g} times faster than {fastest_m_s:g} m/s, first to "
-            f"{leaps[0]:.6g} s: nothing is claimed of them"
+            f"{name}: {counted(count, 'step')} more than {says}, first to {t_s[1:][leaps][0]:.6g} s: nothing is "
+            "claimed of them, and positions before or after may be wrong, as when odometry is reset"
         )
+    # A recorder that loses a body may write its last place again; then the body leaps to where it is found.
+    stays = (np.diff(places[:, :2], axis=0) == 0.0).all(axis=1)
+    stay = np.cumsum(~stays)  # the number of each stay; a leap has the next number
+    unknown = t_s[1:][leaps | (stays & np.isin(stay, stay[leaps] - 1))]
     usual = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
     origin = {"stream": stream.label, "frame": stream.frame, "clock": stream.clock, "source": stream.source}
-    return Track(t_s, places, gap_s or GAP * usual, origin, tuple(leaps.tolist()), usual)
+    return Track(t_s, places, gap_s or GAP * usual, origin, tuple(unknown.tolist()), usual)
 
 
 def _of_one_recording(name: str, ns: Whole, places: Array, fastest_m_s: float) -> None:

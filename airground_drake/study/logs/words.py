@@ -26,9 +26,10 @@ def headline(judged: Judged) -> str:
     if unsure:
         pair = unsure[0]
         return f"NOT ESTABLISHED ({pair.first}, {pair.second}): {least(pair)}; the position error decides"
+    frame = ", if the log is in the scenario's frame" if elsewhere(judged) else ""
     if not judged.covers_all:
-        return "No distance was broken where the log covers it."
-    return "Every distance was kept, with straight motion between samples."
+        return f"No distance was broken where the log covers it{frame}."
+    return f"Every distance was kept, with straight motion between samples{frame}."
 
 
 def coverage(judged: Judged) -> str:
@@ -70,7 +71,7 @@ def doing(pair: JudgedPair) -> str:
 
 def law(pair: JudgedPair) -> str:
     if pair.missed_m <= SMALL:
-        held = f"the law held in all {pair.intervals} intervals"
+        held = f"the law held in all {pair.intervals} intervals" if pair.intervals else "no interval was recorded"
     else:
         who = ", ".join(f"{name} {missed_m:.3g} m" for name, missed_m in pair.missed_by_m.items() if missed_m > SMALL)
         by = f" ({who})" if len(pair.missed_by_m) > 1 and who else ""
@@ -93,13 +94,15 @@ def remarks(judged: Judged) -> Iterator[str]:
     for name, (speed, limit) in judged.speeds_m_s.items():
         if speed > FASTER * limit:
             yield f"{name} moves at up to {speed:.3g} m/s, above its limit of {limit:g} m/s"
+    if off := elsewhere(judged):
+        yield f"{off}; if the log is in another frame, its distances to obstacles are meaningless"
+
+
+def elsewhere(judged: Judged) -> str:
+    """Which robots do not start as in the scenario, in words; '' if none, or if places of the scenario do not count."""
     near = min((pair.safe_m for pair in judged.pairs), default=0.0)
-    if off := {name: away for name, away in judged.away_m.items() if away > max(near, ELSEWHERE_M)}:
-        shifts = ", ".join(f"{name} by {away:.3g} m" for name, away in off.items())
-        yield (
-            f"robots do not start as in the scenario: {shifts}; if the log is in another frame, its distances to "
-            "obstacles are meaningless"
-        )
+    off = [f"{name} by {away:.3g} m" for name, away in judged.away_m.items() if away > max(near, ELSEWHERE_M)]
+    return f"robots do not start as in the scenario: {', '.join(off)}" if off and judged.by_scenario else ""
 
 
 def source(name: str, tracks: Tracks) -> str:

@@ -3,17 +3,21 @@
 import sqlite3
 from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
+from decimal import Decimal
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import zstandard
 from builders import logs
 from builders.logs import BROKEN, EPOCH_NS, Motion, Ros
 
+from airground_drake.base.errors import LogError
 from airground_drake.scenario.load import load, resolved
 from airground_drake.study.logs.judging import BROKEN as NOT_KEPT
 from airground_drake.study.logs.judging import KEPT, judge
@@ -185,6 +189,25 @@ def parquet(folder: Path, change: Callable[[pd.DataFrame], pd.DataFrame] = pd.Da
     head, *lines = logs.long(FULL)
     frame = pd.DataFrame(lines, columns=head).astype({name: float for name in head if name != "body"})
     change(frame).to_parquet(folder / "log.parquet")
+    return folder / "log.parquet"
+
+
+def arrow(folder: Path, stamps: Callable[[pa.Array], pa.Array]) -> Path:
+    """Parts of structures, categories, decimals, and columns of types that nobody needs; stamps are made from ns."""
+    rows = logs.rows(FULL)
+    axes = [
+        [Decimal(cell) for cell in column] for column in zip(*(logs.fixed(place) for *_, place in rows), strict=True)
+    ]
+    place = pa.StructArray.from_arrays([pa.array(axis) for axis in axes], names=[*"xyz"])
+    codes, names = pd.factorize(np.array([name for _, name, _ in rows], dtype=object))
+    columns = {
+        "t": stamps(pa.array([round(t * 1e9) for t, *_ in rows])),
+        "robot": pa.DictionaryArray.from_arrays(pa.array(codes, pa.uint8()), pa.array(names)),
+        "pose": pa.StructArray.from_arrays([place], names=["position"]), "tags": [[["a"]]] * len(rows),
+        "twist": [{"linear": [1.0], "of": [["a"]]}] * len(rows), "image": [b"\xff"] * len(rows),
+        "noon": pa.array([1] * len(rows), pa.time64("us")), "rest": pa.array([1] * len(rows), pa.duration("us")),
+    }  # fmt: skip
+    pq.write_table(pa.table(columns), folder / "log.parquet")
     return folder / "log.parquet"
 
 
@@ -398,9 +421,17 @@ FORMS = {
                    ("uav is not in the log",)),
     "parquet": Form(parquet, FULL),
     "parquet with dates": Form(partial(parquet, change=dated), FULL),
+    "parquet with dates as an index": Form(
+        partial(parquet, change=lambda frame: dated(frame).set_index("t_s").rename_axis(None)), FULL
+    ),
     "parquet of a frame with an index and categories": Form(
         partial(parquet, change=lambda frame: frame.astype({"body": "category"}).set_index("t_s")), FULL
     ),
+    "Arrow, durations": Form(partial(arrow, stamps=lambda ns: ns.cast(pa.duration("ns"))), FULL),
+    "Arrow, a zone and unneeded columns": Form(
+        partial(arrow, stamps=lambda ns: ns.cast(pa.timestamp("ns")).cast(pa.timestamp("us", "Europe/Berlin"))), FULL
+    ),
+    "durations": Form(table("log.csv", lab(FULL, "t,body,x,y,z", lambda t: str(pd.Timedelta(seconds=t)))), FULL),
     "times of each body": Form(table("log.csv", own_clocks), JITTER),
     "velocities beside positions": Form(table("log.csv", velocities), FULL),
     "a folder per robot": Form(by_folder, FULL),
@@ -414,6 +445,11 @@ FORMS = {
         table("log.csv", lab({"A": FULL["tb_0"], "B": FULL["tb_1"], "uav": FULL["uav"]}, "clock,who,px_,py_,up")),
         FULL, (), {"columns": {"t": "clock", "body": "who", "x": "px_", "y": "py_", "z": "up"},
                    "rename": {"A": "tb_0", "B": "tb_1"}},
+    ),
+    "other names with units": Form(
+        table("log.csv", lambda: [["clock", "id", "eastCm", "north_cm", "up (cm)"], *logs.long(FULL, scale=100.0)[1:]]),
+        FULL, ("lengths are in centimetres, as the file says",),
+        {"columns": {"t": "clock", "body": "id", "x": "eastCm", "y": "north_cm", "z": "up (cm)"}},
     ),
     "other names, wide": Form(
         table("log.csv", lambda: logs.wide(FULL, "{}<{}>")), FULL, (),
@@ -512,6 +548,10 @@ def test_these_numbers_would_be_kept_if_receipt_counted_or_a_unit_were_missed() 
 def test_what_was_not_used_is_named(tmp_path: Path, document: dict[str, Any]) -> None:
     assert logs.read(FORMS["words"].write(tmp_path), document).ignored == ["log.csv: columns comment, battery"]
     assert "run.bag: /tb_0/cmd_vel (geometry_msgs/msg/Twist)" in logs.read(ros1(tmp_path), document).ignored
+    path = arrow(tmp_path, lambda ns: ns.cast(pa.duration("ns")))
+    assert logs.read(path, document).ignored == ["log.parquet: columns rest, tags, twist.linear, twist.of, image, noon"]
+    with pytest.raises(LogError, match=r"column 't' is needed, and of type list<.*>; wanted: numbers, texts, times or"):
+        logs.read(arrow(tmp_path, lambda ns: pa.array([[each] for each in ns.to_pylist()])), document)
     assert "room: names no body of the scenario" in logs.read(gazebo(tmp_path), document).ignored
 
 

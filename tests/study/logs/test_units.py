@@ -11,6 +11,7 @@ from builders.logs import BROKEN, Motion
 
 from airground_drake.base.errors import LogError
 from airground_drake.scenario.load import load, resolved
+from airground_drake.study.logs import words
 from airground_drake.study.logs.judging import judge
 from airground_drake.study.logs.stream import Stream
 
@@ -53,9 +54,22 @@ def resting(t: Any, p: Any) -> tuple[Any, Any]:
 @pytest.mark.parametrize("change", [offset, resting])
 def test_metres_and_seconds_stand_unless_they_are_impossible(change: Callable[..., Any], tmp_path: Path) -> None:
     """Robots in a frame whose origin is far away are no robots in centimetres; nor does a long rest make a log one."""
-    found, said = least_m(written(tmp_path, moved(FULL, all=change)), document(tmp_path), gap_s=1e4)
+    path = written(tmp_path, moved(FULL, all=change))
+    found, said = least_m(path, document(tmp_path, obstacles={}), gap_s=1e4)
     assert found == pytest.approx(RIGHT_M, abs=1e-9)
     assert not any("taken as" in each for each in said)
+
+
+def test_obstacles_are_not_judged_in_another_frame(tmp_path: Path) -> None:
+    """Far from all that the scenario has, distances to its obstacles would be kept; near it, the verdict says 'if'."""
+    with pytest.raises(LogError, match=r"tb_0 starts 117 m from its start in the scenario, .* is in another frame"):
+        least_m(written(tmp_path, moved(FULL, all=offset)), document(tmp_path))
+    aside = moved(FULL, all=lambda t, p: (t, p + np.array([3.0, 2.0, 0.0])))
+    kept = moved(aside, tb_1=lambda t, p: (t, p + np.array([0.0, 0.5, 0.0])))
+    for obstacles, says in ((logs.scenario()["obstacles"], ", if the log is in the scenario's frame."), ({}, ".")):
+        scenario = document(tmp_path, obstacles=obstacles)
+        judged = judge(logs.read(written(tmp_path, kept), scenario), scenario)
+        assert words.headline(judged) == f"Every distance was kept, with straight motion between samples{says}"
 
 
 @pytest.mark.parametrize("rate", [10.0, 25.0, 100.0])
@@ -98,9 +112,13 @@ def test_eight_columns_without_a_header_are_tum_only_if_four_are_a_quaternion(tm
         ({"frame": "battery"}, "t,body,x,y,z,battery", "--map-columns frame=battery has no effect"),
         ({"body": "battery"}, "t,who,tb_0_x,tb_0_y,tb_0_z,battery", "--map-columns body=battery has no effect"),
         ({"z": "battery"}, "t,who,tb_0_x,tb_0_y,tb_0_z,battery", "--map-columns z=battery has no effect"),
+        ({"x": "east_ft"}, "t,body,east_ft,y,z,battery", "says 'ft'; wanted: a column in m, cm, mm; if its name is wr"),
+        ({"x": "EastIn"}, "t,body,EastIn,y,z,battery", "x=EastIn: the name of that column says 'in'; wanted: a column"),
+        ({"x_m": "east [mm]"}, "t,body,east [mm],y,z,b", r"says 'mm'; wanted: x_mm=east \[mm\]; if its name is wrong"),
+        ({"t": "clock_min"}, "clock_min,body,x,y,z,battery", "says 'min'; wanted: a column in s, ms, us, ns; if its"),
     ],
 )
-def test_a_column_that_is_chosen_in_vain_is_refused(
+def test_a_column_that_is_chosen_in_vain_or_in_another_unit_is_refused(
     columns: dict[str, str], head: str, says: str, tmp_path: Path
 ) -> None:
     rows = [[*line, "97"] for line in logs.long({"tb_0": FULL["tb_0"]})[1:]]
