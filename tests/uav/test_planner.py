@@ -344,6 +344,8 @@ def test_the_planner_has_each_ugv_s_own_limits() -> None:
         ("{kind: unicycle, hand_point_m: 0.2}", False),  # no turning limit
         ("{kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 4.0}", True),
         ("{kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 20.0}", False),  # 4 m/s at the hand point, limit 3 m/s
+        ("{kind: unicycle, hand_point_m: 0.2, wheel_base_m: 0.3, max_wheel_speed_m_s: 3.7}", True),
+        ("{kind: unicycle, hand_point_m: 0.2, wheel_base_m: 0.3, max_wheel_speed_m_s: 3.8}", False),  # 3 hypot(1, 0.75)
     ],
 )
 def test_who_may_fall_behind_a_motion(plant: str, behind: bool) -> None:
