@@ -313,6 +313,16 @@ def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
     assert list(map(as_tuple, sent.mapped)) == [known, unknown]
 
 
+def test_an_old_report_of_what_has_left_the_map_teaches_nothing() -> None:
+    """A new one does: another obstacle has come in its place."""
+    (rock,) = map(as_tuple, balls([2.0, 9.0, 0.0], 3.0, 1.0))
+    uav = replace(planner(Scripted({"one": wait(9.0)})), mapped=stacked([rock]), mapped_until=5.0)
+    memory = step(uav, uav.start(), 1.0, "one")
+    for t, number, learnt in ((1.1, 0, ()), (5.0, 0, ()), (5.0, 1, (rock,))):
+        memory = step(uav, memory, t, "one", {"one": ACCEPT}, Report(number, (rock,)))
+        assert memory.learnt == learnt
+
+
 def test_a_policy_sees_each_robot_as_it_is() -> None:
     """Positions, speed limits, and who stands: of that very robot, whichever UGV it is asked about."""
     policy = Scripted()
