@@ -97,6 +97,7 @@ def safe_own(run: Run) -> Found | None:
         apart_m = pair.shape.held_m(run.apart(pair), run.apart(pair), run.apart(pair), np.inf)[0]
         kept = apart_m >= pair.safe_m - SMALL  # a pair that starts too near is judged once it has been apart
         too_near = np.logical_or.accumulate(kept)[:-1] & ~(kept[:-1] & kept[1:])
+        reach = np.inf if too_near.any() else reach  # the other one may have come from afar
         for robot, other in ((pair.robot, pair.other), (pair.other, pair.robot)):
             if robot in ways:
                 held = run.body_m[other][sample[both]]

@@ -165,8 +165,8 @@ def _carried(trace: Trace, scenario: Scenario) -> Wrong:
             message, ugv = (row["kind"], row["number"], row["attempt"]), row["sender" if back else "receiver"]
             sent[message] = Message(*message[:2], row["about"], trace.ugvs.index(ugv), row["sent_s"], message[2])
             recorded[*message, row["copy"]] = row["received_s"]
-        # of one instant, what is repeated leaves before what is new, and a withdrawal before a proposal
-        in_order = sorted(sent.values(), key=lambda m: (m.sent_s, m.attempt == 0, m.kind == "proposal"))
+        # of one instant, what is repeated leaves before what is new; in the table, a withdrawal is before a proposal
+        in_order = sorted(sent.values(), key=lambda m: (m.sent_s, m.attempt == 0))
         carried = link.carry(Transit(), in_order, math.inf)
         expected = {(m.kind, m.number, m.attempt, 0): math.nan for m in carried.lost}
         for at_s, _, copy, m in carried.arrived:

@@ -64,7 +64,7 @@ class Coordinate(Policy):
     5. If it has a way alone, but the joint plan helps nobody, less spacing is tried. A plan that helps nobody is not
        made again until a UGV has moved by more than the spacing of the roadmap, is asked for something else, or the map
        has changed.
-    6. A UGV whose turning limit or lag kept it behind a motion, or would have, gets a slower one next time.
+    6. A UGV whose limits or lag kept it behind a motion, or would have, gets a slower one next time.
 
     Attributes:
         speed: largest speed, m/s; no UGV uses more than SHARE of its limit.

@@ -186,7 +186,7 @@ class Planner:
         for i, (name, talk) in enumerate(zip(self.ugvs, memory.talks, strict=True)):
             proposal = talk.proposal
             if proposal is not None:
-                if answers is None or self._comes_and_goes:
+                if answers is None:
                     return -math.inf
                 answer = answer_to(proposal, answers, i)
                 if answer in (REFUSE, DONE) or (answer == ACCEPT and (reports[i].number > newest or reports[i].seen)):
@@ -198,11 +198,6 @@ class Planner:
             if proposal is None and name in called:
                 until = min(until, talk.retry_at)
         return until
-
-    @cached_property
-    def _comes_and_goes(self) -> bool:
-        """Whether an outline on the map appears or disappears."""
-        return bool((np.asarray(self.mapped_from) > 0.0).any() or np.isfinite(self.mapped_until).any())
 
     def _own(self, intervening: Sequence[bool]) -> list[bool]:
         """Which UGVs need an intervention of this UAV: its own triggered ones."""
@@ -219,13 +214,14 @@ class Planner:
         answers = [answer_to(talk.proposal, now.answers, i) for i, talk in enumerate(memory.talks)]
         heard = [report for report, answer in zip(now.reports, answers, strict=True) if answer != SILENT]
         unknown = {row for report in heard for row in report.sensed} - set(memory.learnt)
+        newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         fresh: tuple[Outline, ...] = ()
-        if unknown:
-            there = self._there(now.t)
-            unmapped = [row for row in unknown if not any(there[k] for k in self._rows.get(row, ()))]
+        if unknown:  # what was on the map may have disappeared since an old report
+            there, rows = self._there(now.t), self._rows
+            new = {row for report in heard if report.number > newest for row in report.sensed}
+            unmapped = [r for r in unknown if r not in rows or (r in new and not any(there[k] for k in rows[r]))]
             fresh = tuple(sorted(unmapped, key=_place))
         talks = self._after_answers(memory.talks, now, answers, learnt=bool(fresh))
-        newest = max((number for number, _ in memory.read[-len(self.ugvs) :]), default=-1)
         latest = {sighting.name: (sighting, when) for sighting, when in memory.seen} | {
             sighting.name: (sighting, now.t) for report in heard for sighting in report.seen
         }

@@ -35,7 +35,7 @@ class Teammate:
         proposal: its proposal in force, or None.
         answered: its answer to that proposal.
         refusals: number of proposals that it has refused in the current intervention.
-        too_fast: number of motions that its plant could not follow, by its turning limit or lag: it would have stalled
+        too_fast: number of motions that its plant could not follow, by its limits or lag: it would have stalled
             on the way and refused them, or was left behind by them.
         resting: whether it gets no proposal now because it has refused one recently.
         radius: of its body, m.

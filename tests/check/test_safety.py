@@ -20,15 +20,17 @@ PERIOD_S, GAIN_1_S, SAFE_M = 0.25, 2.0, 2.0
 BODY = {"position_m": [0.0, 0.0, 0.0], "heading_rad": 0.0, "height_m": 0.0, "segment_m": [], "polygon_m": []}
 
 
-def run(way_m: list[float], speed_m_s: float = 0.0) -> Run:
+def run(way_m: list[float], speed_m_s: float = 0.0, *, ahead_m: float = 0.0, cover_m: float = 0.0) -> Run:
     """A robot that moves along x towards a rock at the origin, one place per control sample; the rock may move."""
+    # ahead_m: how much farther from the rock the point is that the law steers
     t = PERIOD_S * np.arange(len(way_m))
     own = np.column_stack([way_m, np.zeros(len(t)), np.zeros(len(t))])
-    pair = Pair("ugv1", "rock", SAFE_M, 0.0, 1.0 + speed_m_s, 1.0, moves_m_s=speed_m_s)
+    pair = Pair("ugv1", "rock", SAFE_M, 0.0, 1.0 + speed_m_s, 1.0, moves_m_s=speed_m_s, more_m=cover_m, cover_m=cover_m)
     places = {"ugv1": own, "rock": np.zeros((len(t), 3))}
     found = SimpleNamespace(
         t_s=t, sample_row=np.arange(len(t) - 1), pairs=[pair], apart_m={("ugv1", "rock"): 0.0},
-        position_m=places, body_m=places, apart=lambda _: own, bent_m=lambda _: 0.0,
+        position_m=places | {"ugv1": own + np.array([ahead_m, 0.0, 0.0])}, body_m=places, bent_m=lambda _: 0.0,
+        apart=lambda _: own - places["rock"],
         ways={name: Way(t, place) for name, place in places.items()},
         period_rows=lambda _: np.arange(len(t)), there=lambda _: slice(0, len(t)), robots={"ugv1": {}},
         links={"delay_s": 0.0, "loss": 0.0},
@@ -118,14 +120,29 @@ def test_own_doing_is_what_is_lost_of_the_distance_at_the_sample(
     assert found.margin == (margin_m if margin_m is None else pytest.approx(margin_m, abs=1e-12))
 
 
-def test_of_two_robots_each_is_asked() -> None:
+@pytest.mark.parametrize(
+    ("way_m", "ahead_m", "margin_m"),
+    [
+        ([1.0, 1.0], 0.75, 0.0),  # it is nearer than the point less the cover, and may stay so
+        ([1.0, 0.75], 0.0, 0.25),  # within the cover
+        ([2.125, 1.9375], -0.25, -0.0625),  # having been apart, it may not come nearer than d
+    ],
+)
+def test_own_doing_of_a_body_off_the_steered_point(way_m: list[float], ahead_m: float, margin_m: float) -> None:
+    found = safety.safe_own(run(way_m, 1.0, ahead_m=ahead_m, cover_m=0.5))
+    assert found is not None
+    assert found.margin == pytest.approx(margin_m, abs=1e-12)
+
+
+@pytest.mark.parametrize(("robots", "margin_m"), [(["ugv1"], 3.0 - 2.25), (["ugv1", "rock"], 1.5 - 2.25)])
+def test_of_two_robots_each_is_asked(robots: list[str], margin_m: float) -> None:
     """The other one comes nearer while the first one stands."""
     beside = run([3.0, 3.0], 1.0)
-    beside.robots["rock"] = {}
+    beside.robots.update({name: {} for name in robots})
     beside.position_m["rock"][1, 0] = 1.5
     found = safety.safe_own(beside)
     assert found is not None
-    assert found.margin == pytest.approx(1.5 - 2.25, abs=1e-12)
+    assert found.margin == pytest.approx(margin_m, abs=1e-12)
 
 
 def test_own_doing_is_not_asked_where_nothing_may_move() -> None:

@@ -116,6 +116,7 @@ def test_a_benchmark_of_movingai_becomes_a_map_of_ros_with_a_frame_round_it(
     scenario = load(tmp_path / "s.yaml")
     ways = [(ugv.start_m[:2], ugv.target_m[:2]) for ugv in scenario.ugvs.values()]
     assert ways == [([1.0, 7.0], [9.0, 1.0]), ([9.0, 7.0], [1.0, 1.0])]  # the second agent is at its goal
+    assert scenario.duration_s == 50.0  # of 14 m along the axes at 1 m/s, 1.5 times as long, and 20 s
     rows = MAP.split("map\n")[1].split()
     outlines = outlines_of(scenario, scenario.barriers["map"])
     for row, column in np.ndindex(6, 7):
@@ -128,15 +129,16 @@ def test_a_benchmark_of_movingai_becomes_a_map_of_ros_with_a_frame_round_it(
 
 def test_a_shape_above_the_ugvs_is_no_obstacle_and_is_named(tmp_path: Path, airground: Airground) -> None:
     """The UAV flies over it. It is an obstacle for higher UGVs."""
-    lamp = PILLAR.format(name="lamp", shape="<box><size>1 1 0.2</size></box>").replace("9 9 0", "5 0 2.8")
-    (tmp_path / "lamp.world").write_text(f"<sdf><world name='w'>{lamp}</world></sdf>")
+    lamps = [PILLAR.format(name=name, shape="<box><size>1 1 0.5</size></box>") for name in ("a lamp", "a-lamp")]
+    lamps = [lamp.replace("9 9 0", f"5 {k} 2.75") for k, lamp in enumerate(lamps)]
+    (tmp_path / "lamp.world").write_text(f"<sdf><world name='w'>{''.join(lamps)}</world></sdf>")
     said = airground("import", "barn", tmp_path / "lamp.world", "-o", tmp_path / "lamp.yaml")
-    assert said.startswith("0 obstacles\nleft out: lamp, which begins 2.7 m above the ground")
+    assert said.startswith("0 obstacles\nleft out: a lamp, which begins 2.5 m above the ground")
     scenario = load(tmp_path / "lamp.yaml")
     assert not scenario.barriers
-    assert scenario.uav.altitude_m > 2.9
-    airground("import", "barn", tmp_path / "lamp.world", "--height-m", 2.75, "-o", tmp_path / "high.yaml")
-    assert [*load(tmp_path / "high.yaml").barriers] == ["lamp"]
+    assert scenario.uav.altitude_m > 3.0
+    airground("import", "barn", tmp_path / "lamp.world", "--height-m", 2.5, "-o", tmp_path / "high.yaml")
+    assert [*load(tmp_path / "high.yaml").barriers] == ["a_lamp", "a_lamp_2"]
 
 
 def large_map(folder: Path, side_m: float) -> Path:

@@ -63,6 +63,8 @@ def test_what_is_missing_or_faulty_or_ends_too_early(scenario: Scenario, traces:
         return [{"t_s": t_s, "robot": "ugv1", "policy": "mine", "what": what} for what, t_s in said]
 
     assert not items(built(scenario, traces, FINE))
+    wrong = built(scenario, traces, [verdict("a", "error"), verdict("c", "refuted"), FINE[2]])
+    assert [item.chip for item in items(wrong)] == ["refuted", "error"]
     report = built(scenario, traces, FINE[:2])
     report["runs"]["c"]["faults"] = faults(*[("boom.py:5 ValueError: no", 6.05)] * 14, ("late", 9.0))
     report["overall"] |= {"undemonstrated": [7]}
@@ -74,8 +76,11 @@ def test_what_is_missing_or_faulty_or_ends_too_early(scenario: Scenario, traces:
     assert [(item.words, item.anchor) for item in rest] == [
         ("no claim was checked on the run", "claims"), ("finding 7 about the paper", "audit"),
     ]  # fmt: skip
-    report["runs"]["c"]["faults"] = faults(*((f"ValueError: {k}", 1.0) for k in range(100)))
-    assert items(report)[3].words == "97 more kinds of faults"
+    for kinds, more in ((100, ["97 more kinds of faults"]), (3, [])):
+        report["runs"]["c"]["faults"] = faults(*((f"ValueError: {k}", 1.0) for k in range(kinds)))
+        assert [item.words for item in items(report) if "more" in item.words] == more
+    report["scenario"]["resolved"]["duration_s"] = 13.0 / 0.5606  # as long as the presets take
+    assert not [item for item in items(report) if "ends the runs" in item.words]
 
 
 def test_for_whom_the_uav_found_no_way(scenario: Scenario, traces: dict[str, Trace]) -> None:

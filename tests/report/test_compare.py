@@ -52,6 +52,7 @@ WORSE: dict[str, Callable[[Json], object]] = {
     "as bad, and expected no longer": lambda found: claim(found, "a_printed").update(as_expected=False),
     "better, and not expected": lambda found: claim(found, "a_printed").update(status="holds", as_expected=False),
     "a claim that is gone": lambda found: found["claims"].pop(0),
+    "a refuted claim that is gone": lambda found: found["claims"].remove(claim(found, "a_printed")),
     "a row": lambda found: found["reproduction"][0].update(status="not_reproduced"),
     "a row that is gone": lambda found: found["reproduction"].pop(),
     "a finding": lambda found: found["audit"][0].update(demonstrated=False),
@@ -62,6 +63,7 @@ OTHER: dict[str, Callable[[Json], object]] = {
     "a margin": lambda found: claim(found, "").update(margin=0.4),
     "a margin that is gone": lambda found: claim(found, "").update(margin=None),
     "a count": lambda found: claim(found, "").update(exercised=4),
+    "no better and no worse": lambda found: claim(found, "a").update(status="supported"),
     "holds, of late": lambda found: claim(found, "a_printed").update(status="holds", as_expected=True),
     "an expectation": lambda found: claim(found, "a").update(expected="nothing"),
     "a new claim": lambda found: found["claims"].append({**found["claims"][0], "id": "NEW", "status": "refuted"}),
@@ -94,6 +96,15 @@ def test_only_what_is_worse_is_a_regression_and_the_page_has_every_change(
         for each in found[part]:
             about = str(each.get("claim") or each.get("id") or each["robot"])
             assert f'<th scope="row">{about}' in text or f"<td>{about}</td>" in text
+
+
+def test_numbers_are_compared_to_their_size(before: Json) -> None:
+    assert [*compare.differences([1e6, 1.0], [1e6 + 0.009, 1.0 + 3e-8])] == [("1", 1.0, 1.0 + 3e-8)]
+    after = copy.deepcopy(before)
+    claim(after, "a_printed")["margin"] = -0.1  # of -0.2
+    after["runs"]["c"]["events"][1]["t_s"] += 1.0
+    found = compare.compared(of(before), of(after))
+    assert ([each["relative"] for each in found["margins"]], [each["n"] for each in found["events"]]) == ([0.5], [1])
 
 
 def test_inputs_that_differ_come_first_and_rounding_is_only_counted(

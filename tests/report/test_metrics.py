@@ -5,7 +5,9 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import persons
 import pytest
+from builders.edits import with_scenario
 from builders.scenarios import lone
 from builders.simulation import simulate as drive
 from report.cases import GOING_ROUND, event, make_scenario, make_trace
@@ -43,8 +45,15 @@ def test_decisions_are_counted_by_their_gap_and_those_that_met_their_budget(
     table = trace.decisions.iloc[:6].assign(gap=[0.0, -1e-12, -1.0, 0.01, 0.02, 1.0])
     table = table.assign(decision="refuse", number=[1, 1, 2, 2, 2, 3], robot="ugv1", reason=["waits", "kept"] * 3)
     table["status"] = ["optimal", "optimal", "optimal", "budget_spent", "budget_spent", "solver_failed"]
-    found = metrics.gatekeeper(replace(trace, decisions=table))
+    table["accept_throughout"], table["refuse_throughout"] = (
+        [-1.0, 4.0, 1.0, 3.0, 2.0, 9.0],
+        [1.0, 1.0, 3.0, 2.0, 6.0, 1.0],
+    )
+    period_s = trace.scenario.gatekeeper.period_s
+    timings = {"decision_times_s": [0.0, 0.5 * period_s, period_s, 2.0 * period_s]}
+    found = metrics.gatekeeper(replace(trace, decisions=table, timings=timings))
     assert found is not None
+    assert (found["late"], found["closest_call"]["relative_cost_margin"]) == (2, 0.5)
     assert found["gaps"] == {"zero": 2, "up_to_1_percent": 1, "more": 2}
     assert (found["budget_spent"], found["solver_failures"], found["max_gap"]) == (2, 1, 1.0)
     assert found["refusals"] == {"ugv1": {"waits": 2, "kept": 1}}  # first answers only
@@ -77,19 +86,32 @@ def test_seeds_are_those_from_1_on_and_the_reports_own_runs_serve_for_theirs(own
 
 @pytest.mark.parametrize(
     ("speed", "stands", "left_m", "left_s"),
-    [(1.0, False, 29.0, 29.0), (0.0, True, 31.0, None), (-1.0, False, 33.0, None), (0.05, False, 30.9, None)],
+    [(1.0, False, 30.0, 30.0), (0.0, True, 32.0, None), (-1.0, False, 34.0, None), (0.05, False, 31.9, None)],
 )
 def test_how_far_a_ugv_has_come_and_how_long_it_would_need(
     speed: float, stands: bool, left_m: float, left_s: float | None
 ) -> None:
     """Along its preset, which passes near its start again: the part that is not due yet does not count."""
-    preset = Preset([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 5.0, 0.0], [0.0, 5.0, 0.0], [0.0, -1.0, 0.0]], 1.0)
-    scenario = lone([0.0] * 3, [0.0, -1.0, 0.0], preset, 2.0)
+    corners = [(0.0, 0.0), (10.0, 0.0), (10.0, 5.0), (-1.0, 5.0), (-1.0, 0.0), (-1.0, -1.0)]
+    preset = Preset([[*corner, 0.0] for corner in corners], 1.0)
+    scenario = lone([0.0] * 3, [-1.0, -1.0, 0.0], preset, 2.0)
     trace = drive(scenario, drive=lambda t: [[speed, 0.0, 0.0], [0.0] * 3])
     found = metrics.on_the_way(trace)["ugv1"]
     assert (found["stands"], found["left_m"]) == (stands, pytest.approx(left_m))
     assert found["left_s"] == (None if left_s is None else pytest.approx(left_s))
     assert found["creeps"] == (0.0 < speed < 0.1)
+
+
+@pytest.mark.parametrize(("target_m", "on"), [(2.0, True), (1.5, False), (1.2, None)])
+def test_who_is_kept_away_from_its_target_by_a_person_and_since_when(target_m: float, on: bool | None) -> None:
+    """The person stands at 2 m; the radii are 0.45 m, and 0.3 m are kept between them."""
+    trace = with_scenario(persons.run("on the goal"), ugvs__ugv1__target_m=[target_m, 0.0, 0.0])
+    kept, place = metrics.on_the_way(trace)["ugv1"].get("kept_away"), trace.position("ugv1")
+    assert (kept and (kept["by"], kept["on"])) == (on if on is None else ("person", on))
+    if kept:
+        assert kept["off_m"] == pytest.approx(np.linalg.norm(place[-1] - [target_m, 0.0, 0.0]))
+        off_m = np.linalg.norm(place - place[-1], axis=1)
+        assert trace.t[off_m > metrics.AT_REST_M][-1] < kept["since_s"] == trace.t[off_m <= metrics.AT_REST_M][0]
 
 
 def test_stalls_name_the_bodies_that_hold_and_no_others(run: Callable[[str, str], Trace]) -> None:

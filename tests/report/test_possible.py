@@ -24,10 +24,9 @@ SENSING = {"position_error_m": 0.01, "uav_error_m": 0.02}
 
 
 @cache
-def run(method: str = "d") -> Trace:
-    return simulate(
-        team(1, None, channel=CHANNEL, sensing=SENSING, runs={name: {"method": name} for name in "bd"}), method
-    )
+def run(method: str = "d", *other: tuple[str, Any]) -> Trace:
+    channel, runs = CHANNEL | dict(other), {name: {"method": name} for name in "bd"}
+    return simulate(team(1, None, channel=channel, sensing=SENSING, runs=runs), method)
 
 
 def column(table: str, name: Any, value: Callable[[Any], Any], rows: Callable[[Any], Any] | None = None) -> Any:
@@ -148,17 +147,21 @@ def test_a_channel_that_is_declared_better_than_it_was_is_refused() -> None:
         assert [*impossible(run(), scenario)]
 
 
-@pytest.mark.parametrize("method", ["b", "d"])
-def test_of_an_honest_run_nothing_is_said(method: str) -> None:
-    assert len(run(method).messages)
-    assert [*impossible(run(method), run(method).scenario)] == []
+@pytest.mark.parametrize("honest", [("b",), ("d",), ("d", ("reorder", False), ("delay_s", 0.21))])
+def test_of_an_honest_run_nothing_is_said(honest: tuple[Any, ...]) -> None:
+    assert len(run(*honest).messages)
+    assert [*impossible(run(*honest), run(*honest).scenario)] == []
 
 
-@pytest.mark.parametrize(
-    "given", [("duration_s=25.0", "seed=375"), ("duration_s=10.0", "seed=45", "intervention.period_s=0.1")]
-)
-def test_decisions_go_on_until_the_uav_withdraws_a_motion_that_has_run_out(given: tuple[str, ...]) -> None:
-    honest = simulate(load("bayes_threshold", given), "d_printed")
+@pytest.mark.parametrize(("name", "method", "given"), [
+    ("bayes_threshold", "d_printed", ("duration_s=25.0", "seed=375")),
+    ("bayes_threshold", "d_printed", ("duration_s=10.0", "seed=45", "intervention.period_s=0.1")),
+    ("case_b", "c", ()),
+])  # fmt: skip
+def test_decisions_go_on_until_the_uav_withdraws_a_motion_that_has_run_out(
+    name: str, method: str, given: tuple[str, ...]
+) -> None:
+    honest = simulate(load(name, given), method)
     assert [*impossible(honest, honest.scenario)] == []
 
 

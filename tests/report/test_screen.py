@@ -103,6 +103,18 @@ def away(robot: str = "r1", **way: Any) -> Edit:
     return edit
 
 
+def crowd(*left_s: float) -> Edit:
+    """More UGVs, that have so long to go."""
+
+    def edit(found: Document) -> None:
+        ugvs = found["scenario"]["resolved"]["ugvs"]
+        for k, each_s in enumerate(left_s, 3):
+            ugvs[f"r{k}"] = ugvs["r1"]
+            away(f"r{k}", left_s=each_s)(found)
+
+    return edit
+
+
 def lost(at_s: float) -> Edit:
     return lambda found: found["scenario"]["resolved"]["uav"].update(lost_at_s=at_s)
 
@@ -219,6 +231,8 @@ def test_safe(edits: list[Edit], mark: str, lines: list[str]) -> None:
          ["0 of 2 (as declared)", "r1, r2 still driving, 4.2 s to go"]),
         ([away("r1", stands=True), away("r2", left_s=1.0)], "no",
          ["0 of 2 (as declared)", "r1 stopped", "r2 still driving, 1 s to go"]),
+        ([crowd(1.0, 2.0, 3.0, 4.0, 5.0, 5.0)], "partly",
+         ["2 of 8 (as declared)", *(f"r{k + 2} still driving, {k} s to go" for k in range(1, 5)), "2 more UGVs"]),
         ([hit("r2", key="other")], "no", ["0 of 2 (as declared)", "r1 collided with r2", "r2 collided with r1"]),
         ([hit(t_s=13.0)], "yes", ["2 of 2, by 14.5 s"]),  # r1 was there before
     ],
@@ -299,8 +313,8 @@ def test_triggers() -> None:
     )
     assert checks("Zeno-free?") == [("yes", f"{proved}; no robot triggered twice")]
     assert checks("Zeno-free?", gaps) == [("yes", f"{proved}; least gap 3.61 s")]
-    short = judged("ZENO-PROOF", inputs={"dwell_s": 0.01})
-    assert checks("Zeno-free?", short)[0][0] == "partly"
+    for dwell_s, mark in ((0.049, "partly"), (0.05, "yes")):
+        assert checks("Zeno-free?", judged("ZENO-PROOF", inputs={"dwell_s": dwell_s}))[0][0] == mark
     assert checks("Zeno-free?", judged("ZENO-TRACE", status="error")) == [("yes", proved)]
     (bare,) = checks("Zeno-free?", judged("ZENO-PROOF", status="refuted"))
     assert bare == ("no", "no least time between two triggers is proved; no robot triggered twice")
@@ -310,7 +324,7 @@ def test_triggers() -> None:
 def test_threshold() -> None:
     def timed(found: Document) -> None:
         found["runs"]["d"]["events"].append({"kind": "trigger", "robot": "r1", "t_s": 0.0})
-        quality = {"counts": {"false": 1, "missed": 2}, "latest": {"late_s": 0.034}, "earliest": None}
+        quality = {"counts": {"false": 1, "missed": 2}, "latest": {"late_s": 0.01}, "earliest": {"late_s": -0.034}}
         only("d", judged("THR-QUALITY", evidence=quality, status="refuted"))(found)
 
     def lower(found: Document) -> None:
@@ -318,7 +332,9 @@ def test_threshold() -> None:
         found["scenario"]["resolved"]["runs"]["d"]["set"] = {"decision.threshold.rule": "printed"}
 
     for value_m, told in ((0.4, "0.4"), (2.22e-15, "0")):
-        reached = judged("THR-TRIG", evidence={"ugvs": [{"largest_decision_variable_m": value_m}]})
+        reached = judged(
+            "THR-TRIG", evidence={"ugvs": [{"largest_decision_variable_m": x_m} for x_m in (value_m, 0.0)]}
+        )
         assert checks("Threshold correct?", reached) == [("none", f"0 triggers at 1 m (set by hand), {told} m reached")]
     assert checks("Threshold correct?", timed, lower) == [
         ("none", "0 triggers at 1 m (set by hand)"),
@@ -358,6 +374,10 @@ def test_what_is_not_as_declared_and_what_not_to_conclude() -> None:
     assert [told.partition(":")[0] for told in shown.beware] == [
         "the UAV helps", "robots can keep away from man", "robots arrive from other starts or in reality",
     ]  # fmt: skip
+    own = [{"robot": f"r{k}", "drift_m_s": 0.1, "declared_drift_m_s": 0.2, "cover_m": cover_m, "declared_cover_m": 0.5}
+           for k, cover_m in enumerate((0.1, 0.3, 0.2))]  # fmt: skip
+    told = screen_of(document(judged("SAFE-HYP", evidence={"own_plants": own}))).beware[-1]
+    assert told.endswith("r1 showed 0.1 of 0.2 m/s drift and 0.3 of 0.5 m cover here")
 
 
 def shaken(found: Document, seed: int) -> Document:

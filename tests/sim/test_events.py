@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from builders.edits import with_meta
 from builders.runs import passing_by
@@ -89,6 +90,17 @@ def test_a_ugv_that_has_done_its_part_refuses_nothing(run: Callable[..., Trace])
     assert begins.items() <= {(each.robot, each.spans[-1].end_s) for each in sent(trace)}
 
 
+def test_each_proposal_has_its_answer_and_events_of_one_time_are_by_robot(run: Callable[..., Trace]) -> None:
+    trace = run("doorway", "d")
+    accepted = trace.decisions[trace.decisions["decision"] == "accept"].head(1)
+    (t_s,), (first, second, *_) = accepted["t_s"], trace.ugvs
+    decisions = pd.concat([accepted.assign(robot=first, number=number) for number in (0, 1)])
+    sent_to = trace.proposals.head(1).assign(robot=second, issued_s=t_s)
+    found = events.extract(replace(trace, decisions=decisions, proposals=sent_to))
+    told = [(event["robot"], event["kind"]) for event in found if event["kind"] in ("accept", "proposal")]
+    assert told == [(first, "accept")] * 2 + [(second, "proposal")]
+
+
 def test_nothing_after_a_collision_counts() -> None:
     """A UGV arrives, then a UAV hits it and it drives on. Without the hit it does not arrive."""
     hit, missed = crossing(4.0), crossing()
@@ -101,7 +113,7 @@ def test_nothing_after_a_collision_counts() -> None:
         assert (worst["robot"], "collided_s" in worst) == (("uav", True) if arrivals == {"ugv1"} else ("ugv1", False))
 
 
-def test_an_arrival_after_a_collision_is_none() -> None:
+def test_an_arrival_after_a_collision_is_none_and_one_at_the_tolerance_counts() -> None:
     """Through an obstacle to its target: the collision is named, with its time."""
     scenario = lone([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], STILL, 2.0, obstacles={"rock": Obstacle([0.0] * 3)})
     trace = simulate(scenario, drive=lambda t: [[1.0, 0.0, 0.0], [0.0] * 3])
@@ -111,3 +123,4 @@ def test_an_arrival_after_a_collision_is_none() -> None:
     assert finding.status == "refuted"
     assert finding.where["robot"] == "ugv1"
     assert finding.where["collided_s"] == pytest.approx(1.0 - trace.scenario.safe_distance.collision_m, abs=0.026)
+    assert events.arrival_row(np.array([[2.0, 0.0, 0.0], [0.5, 0.0, 0.0]]), [0.0] * 3, 0.5) == 1

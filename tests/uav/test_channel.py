@@ -71,6 +71,7 @@ def test_shares_and_bursts_are_as_asked_for(burst_s: float) -> None:
     assert len(found.lost) / 9000 == pytest.approx(0.3, abs=0.05 if burst_s else 0.02)
     assert sum(d.copy for d in found.arrived) / (9000 - len(found.lost)) == pytest.approx(0.25, abs=0.02)
     assert (late.min(), late.max()) == pytest.approx((0.1, 0.3), abs=1e-3)
+    assert len({*late.tolist()}) == len(late)  # a copy is late by itself
     gone = np.diff([m.number for m in found.lost if m.ugv == 0])
     assert (np.mean(gone == 3) > 0.7) == (burst_s > 0.0)  # the next message of the same UGV is lost, too
 

@@ -16,7 +16,7 @@ from airground_drake.uav.coordinate import Coordinate
 from airground_drake.uav.database import predicted_cost
 from airground_drake.uav.detour import Detour
 from airground_drake.uav.halts import NOT_WATCHED, STANDS_S, room, standing, watched
-from airground_drake.uav.policy import Observation, Policy, Proposal
+from airground_drake.uav.policy import MovingObstacle, Observation, Policy, Proposal
 from airground_drake.uav.wrong import StaleMap
 
 DETOUR = Detour(speed_m_s=1.0)
@@ -112,6 +112,14 @@ def test_the_predicted_cost_counts_intrusion_into_obstacles_and_every_teammate()
     alone, parked = seen([stuck]), mate("ugv2", [1.0, 0.0], [1.0, 0.0], triggered=False)
     for team in ((parked, stuck), (stuck, parked)):
         assert predicted_cost(motions, replace(alone, team=team)) > predicted_cost(motions, alone) + 100.0
+    way = Proposal("detour", 9.0, Motion(np.array([9.0]), np.array([[1.0, 0.0, 0.0]])))
+    for answered in ("silent", "accepted"):
+        asked = replace(alone, team=(stuck, replace(parked, standing=False, proposal=way, answered=answered)))
+        assert (predicted_cost(motions, asked) > predicted_cost(motions, alone)) == (answered == "accepted")
+    person = MovingObstacle("person", balls(np.zeros(3), 0.25, 0.5), np.zeros(3), np.zeros(3), way.motion)
+    for own, near in ((0.2, False), (0.3, True)):  # 1 m away
+        beside = replace(alone, moving=(person,), radius=own)
+        assert (predicted_cost(motions, beside) > predicted_cost(motions, alone)) == near
 
 
 @pytest.mark.parametrize("ratio", [1.0, 0.9999])

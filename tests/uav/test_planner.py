@@ -313,6 +313,16 @@ def test_radii_come_with_a_refusal_and_go_out_with_a_proposal() -> None:
     assert list(map(as_tuple, sent.mapped)) == [known, unknown]
 
 
+def test_an_old_report_of_what_has_left_the_map_teaches_nothing() -> None:
+    """A new one does: another obstacle has come in its place."""
+    (rock,) = map(as_tuple, balls([2.0, 9.0, 0.0], 3.0, 1.0))
+    uav = replace(planner(Scripted({"one": wait(9.0)})), mapped=stacked([rock]), mapped_until=5.0)
+    memory = step(uav, uav.start(), 1.0, "one")
+    for t, number, learnt in ((1.1, 0, ()), (5.0, 0, ()), (5.0, 1, (rock,))):
+        memory = step(uav, memory, t, "one", {"one": ACCEPT}, Report(number, (rock,)))
+        assert memory.learnt == learnt
+
+
 def test_a_policy_sees_each_robot_as_it_is() -> None:
     """Positions, speed limits, and who stands: of that very robot, whichever UGV it is asked about."""
     policy = Scripted()
@@ -344,6 +354,8 @@ def test_the_planner_has_each_ugv_s_own_limits() -> None:
         ("{kind: unicycle, hand_point_m: 0.2}", False),  # no turning limit
         ("{kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 4.0}", True),
         ("{kind: unicycle, hand_point_m: 0.2, max_turn_rad_s: 20.0}", False),  # 4 m/s at the hand point, limit 3 m/s
+        ("{kind: unicycle, hand_point_m: 0.2, wheel_base_m: 0.3, max_wheel_speed_m_s: 3.7}", True),
+        ("{kind: unicycle, hand_point_m: 0.2, wheel_base_m: 0.3, max_wheel_speed_m_s: 3.8}", False),  # 3 hypot(1, 0.75)
     ],
 )
 def test_who_may_fall_behind_a_motion(plant: str, behind: bool) -> None:

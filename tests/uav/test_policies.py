@@ -16,7 +16,7 @@ from airground_drake.model.geometry.motion import Motion
 from airground_drake.scenario.schema import Policy as PolicyEntry
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.simulation import simulate
-from airground_drake.uav.database import BehaviourDatabase, Negotiation
+from airground_drake.uav.database import BehaviourDatabase, Negotiation, Ranking
 from airground_drake.uav.policy import Observation, Policy
 from airground_drake.uav.wrong import Hostile
 
@@ -62,6 +62,23 @@ def test_after_a_failure_the_next_policy_is_asked(case_a: Scenario) -> None:
         of_run = simulate(case_a, "d")
     assert "proposal" in kinds(of_run, "ugv1")
     assert re.fullmatch(r"test_policies\.py:\d+ RuntimeError: no plan", of_run.meta["faults"][0]["what"])
+
+
+class Counts(Returns):
+    def propose(self, seen: Observation) -> Any:
+        self.remembered = (self.remembered or 0) + 1
+        return super().propose(seen)
+
+
+@pytest.mark.parametrize("ranking", ["listed", "predicted"])
+def test_after_a_refusal_the_next_policy_is_asked_and_remembers_its_own(ranking: Ranking) -> None:
+    policies = [("nearer", Counts(along(9.0, 9.0))), ("near", Counts(along(5.0, 9.0)))]
+    database, memories = BehaviourDatabase(policies, ranking=ranking), {1: 4}
+    held = database.after_refusal(Negotiation(too_fast=1), 9.0, too_fast=True)
+    talks, _ = database.plan(held, seen([mate("a", (0, 0), (10, 0))]), memories)
+    proposal = talks["a"].proposal
+    assert proposal is not None
+    assert (proposal.policy, held.too_fast, memories[1]) == ("near", 2, 5)
 
 
 class Hangs(Policy):

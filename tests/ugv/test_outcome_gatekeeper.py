@@ -7,6 +7,7 @@ import pytest
 from builders.problems import LAW
 from builders.worlds import world
 
+from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.geometry.motion import Motion
 from airground_drake.model.geometry.outline import balls
 from airground_drake.uav.messages import ACCEPT, DONE, REFUSE, SILENT
@@ -26,9 +27,11 @@ class Team:
     The gatekeepers are called as their system calls them, a sample at a time.
     """
 
-    def __init__(self, rocks: np.ndarray = ROCK) -> None:
+    def __init__(self, rocks: np.ndarray = ROCK, gone_s: float = np.inf) -> None:
         preset, patience = Motion(np.zeros(1), np.array([[20.0, 0.0, 0.0]])), Patience(most=2, rest=1.0, longest=5.0)
-        self.gate = OutcomeGatekeepers(world(("ugv", "other"), rocks), LAW, [preset] * 2, Outlook(5.0), patience)
+        around = world(("ugv", "other"), rocks)
+        around = replace(around, bodies=tuple(replace(body, disappears_s=gone_s) for body in around.bodies))
+        self.gate = OutcomeGatekeepers(around, LAW, [preset] * 2, Outlook(5.0), patience)
         self.memory, self.t, self.calls = GatekeeperState.empty(2), 0.0, 0
 
     def sees(self, proposal: Proposal | None, x: float = 20.0, other: Proposal | None = None) -> Commitment:
@@ -52,6 +55,14 @@ def test_obstacles_that_were_in_sight_stay_known() -> None:
     told = team.gate._believed(np.array([40.0, 0.0, 0.0]), team.memory.sensed[0], proposal)
     assert team.memory.sensed[0].all()
     assert not len(told)
+
+
+def test_an_obstacle_is_forgotten_at_the_sample_at_which_it_disappears() -> None:
+    """Though nothing is proposed, and the UGV leaves at once."""
+    team = Team(gone_s=0.2 + 0.9 * SAME_S)
+    for x, known in ((0.0, 1), (0.0, 1), (0.0, 1), (0.0, 0), (40.0, 0)):
+        team.sees(None, x)
+        assert team.memory.sensed.sum() == known
 
 
 def test_an_obstacle_that_nobody_knew_is_a_reason_to_look_again_and_costs_no_try() -> None:

@@ -1,6 +1,8 @@
 """Array judges come to what the judge of traces comes to, and pass nothing that is wrong with a run."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,7 +15,8 @@ from airground_drake.sim.batch.loop import Log
 from airground_drake.sim.batch.run import Batch, LeftToDrakeError
 from airground_drake.study.testing.strategies import scenarios
 from airground_drake.verify import judge
-from airground_drake.verify.array_judges import SCREENED, ArrayJudges, NoScreenError
+from airground_drake.verify.array_judges import SCREENED, ArrayJudges, NoScreenError, replayed, triggers
+from airground_drake.verify.finding import Finding
 
 SHORT = ["duration_s=17.33", "reproduction=[]"]
 
@@ -46,7 +49,7 @@ def test_drawn_scenarios(scenario: Scenario) -> None:
 
 @pytest.fixture(scope="module")
 def loop() -> Batch:
-    return Batch(load("case_a", SHORT), "d")
+    return Batch(load("case_a", [*SHORT, "obstacles.obstacle_3.radius_m=0.2"]), "d")
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +104,16 @@ def shorter(log: Log) -> Log:
     return Log(*(column[:-1] for column in log))
 
 
+def later(log: Log) -> Log:
+    return Log(*(column[1:] for column in log))
+
+
+def noise_at_the_start(log: Log) -> Log:
+    log.noise[:, 1] += 2e-8
+    log.x[:, 1] += 2e-8
+    return log
+
+
 def hole(log: Log) -> Log:
     return Log(*(np.delete(column, slice(100, 103), axis=0) for column in log))
 
@@ -108,6 +121,7 @@ def hole(log: Log) -> Log:
 WRONG: dict[Callable[[Log], Log], str] = {
     moved: "SAFE-TRACE", overtaken: "SAFE-TRACE", late: "THR-TRIG", missed: "THR-TRIG", other_mode: "THR-TRIG",
     other_variable: "THR-TRIG", jump_of_the_noise: "THR-TRIG", shorter: "SAFE-TRACE", hole: "THR-TRIG",
+    later: "SAFE-TRACE", noise_at_the_start: "THR-TRIG",
 }  # fmt: skip
 
 
@@ -117,6 +131,30 @@ def test_what_is_wrong_with_a_run_does_not_pass(change: Callable[[Log], Log], lo
     assert judges.findings(log)[WRONG[change]].status == "holds"
     finding = judges.findings(change(Log(*(column.copy() for column in log)))).get(WRONG[change])
     assert finding is None or finding.status == "refuted"
+
+
+def test_what_a_collision_the_end_or_rounding_decides_is_left_to_the_judge_of_traces(
+    loop: Batch, log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judges, given, hit = ArrayJudges(loop), loop.given, Log(*(column.copy() for column in log))
+    hit.bodies[:, :3] = given.obstacles["obstacle_3"].position_m + np.array([given.safe_distance.collision_m, 0.1, 0.0])
+    hit.command[:, :3] = 0.0
+    assert judges.findings(hit) == {}  # its radius is 0.2 m
+    row = int(np.flatnonzero(log.status[:, 0])[0])  # before it, a trigger is due
+    of_rows = log.t, log.bodies, log.noise, log.x, log.status
+    ends = [
+        replayed(*(column[:end] for column in of_rows), loop.team.corners, loop.team.levels) for end in (row, row + 1)
+    ]
+    assert [agreed for *_, agreed in ends] == [False, True]
+    margin = judges.findings(log)["LIVE-GOAL"].margin
+    monkeypatch.setattr(given, "arrival_tolerance_m", given.arrival_tolerance_m - margin)
+    monkeypatch.setattr(given.decision, "min_inter_event_s", 0.0)
+    assert judges.findings(log, ["LIVE-GOAL", "ZENO-TRACE"]) == {"ZENO-TRACE": Finding("not_run")}
+
+
+def test_a_run_may_begin_with_a_trigger() -> None:
+    begun = SimpleNamespace(status=np.array([[1.0, 1.0, 0.0, -1.0], [1.0, 2.0, 5.0, 3.0]]))
+    assert [times.tolist() for times in triggers(cast("Any", begun))] == [[0.0, 5.0]]
 
 
 def test_robots_that_are_left_to_the_judge_of_traces() -> None:

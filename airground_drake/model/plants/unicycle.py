@@ -97,8 +97,9 @@ class Unicycle(Plant):
         return min(self.max_turn_rad_s, wheels)
 
     def trails(self, speed_m_s: float) -> bool:
-        """Whether the hand point cannot move sideways at this speed."""
-        return self.max_turn_rad_s * self.hand_m < speed_m_s
+        """Whether the hand point cannot move in every direction at this speed."""
+        wheel_m_s = speed_m_s * math.hypot(1.0, 0.5 * self.wheel_base_m / self.hand_m)
+        return self.max_turn_rad_s * self.hand_m < speed_m_s or self.max_wheel_m_s < wheel_m_s
 
     def turning_rad_s(self, speed_m_s: float) -> float:
         """The fastest turn under commands up to a speed: its limit, or (2/h) asin(V h / (2 l)) if that is less."""

@@ -39,6 +39,12 @@ def test_a_run_is_drakes_bit_by_bit(run: str) -> None:
     assert differences(short, run) == []
 
 
+def test_a_log_that_is_full_grows() -> None:
+    batch = Batch(load("minimal", ["duration_s=2.0"]), "a")
+    whole, batch.rows = batch.simulate(), 7
+    assert first_difference(batch.simulate(), whole) is None
+
+
 ODD = {
     "bare and noisy": ["decision.trigger=bare", "decision.noise_m_sqrt_s=0.5"],
     "leak": ["decision.leak_1_s=0.3", "decision.noise_period_s=0.01"],

@@ -58,7 +58,7 @@ def word(found: dict[str, Any]) -> tuple[str, str]:
 
 def test_untested_runs_are_ignored_and_undecided_ones_count_against_the_claim() -> None:
     rows = [row(i) for i in range(90)]
-    rows += [row(90, "refuted"), row(91, "inconclusive"), row(92, exercised=0.0, margin=NAN)]
+    rows += [row(90, "refuted"), row(91, "inconclusive"), row(92, exercised=0.0, margin=-1.0)]
     (claim,) = conclude(rows)["claims"]
     assert counts(claim) == [92, 1, 1, 1]
     assert claim["fixed"] == pytest.approx([clopper_pearson(1, 92).low, clopper_pearson(2, 92).high])
@@ -69,12 +69,14 @@ def test_untested_runs_are_ignored_and_undecided_ones_count_against_the_claim() 
 
 def test_an_unfinished_run_is_undecided() -> None:
     """A run that was stopped, and a draw whose process died; not a draw without a valid scenario."""
-    rows = [*(row(i) for i in range(90)), stopped(90, "d"), *died(91)]
+    rows = [row(i, "refuted" if i < 20 else "holds") for i in range(89)]
+    rows += [row(89, "inconclusive"), stopped(90, "d"), *died(91)]
     (claim,) = conclude([*rows, stopped(92, "c"), stopped(93, "", INVALID)])["claims"]
-    assert counts(claim) == [92, 0, 2, 0]
-    assert claim["fixed"] == pytest.approx([0.0, clopper_pearson(2, 92).high])
-    value = confidence_sequence(2, 92).high
-    assert [Stopping("SAFE-TRACE", True, value * share).met(rows) for share in (0.999, 1.001)] == [False, True]
+    assert counts(claim) == [92, 20, 3, 0]
+    assert claim["fixed"] == pytest.approx([clopper_pearson(20, 92).low, clopper_pearson(23, 92).high])
+    for below, value in ((True, confidence_sequence(23, 92).high), (False, confidence_sequence(20, 92).low)):
+        met = [Stopping("SAFE-TRACE", below, value * share).met(rows) for share in (0.999, 1.001)]
+        assert met == [not below, below]
 
 
 def test_a_draw_with_one_unfinished_run_is_not_judged_and_meets_no_rule() -> None:
@@ -178,8 +180,8 @@ def test_without_independent_draws_there_is_no_interval() -> None:
 
 def test_marks_are_found_in_distributions_and_no_draw_is_no_error() -> None:
     rows = [row(i, first_trigger_s=float(i)) for i in range(10)] + [row(10, first_trigger_s=NAN)]
-    (times,) = conclude(rows, marks={"first_trigger_s": 7.5})["times"]
-    assert (times["first_trigger_s"]["share_below_mark"], times["first_trigger_s"]["count"]) == (0.8, 10)
+    (times,) = conclude(rows, marks={"first_trigger_s": 7.0})["times"]
+    assert (times["first_trigger_s"]["share_below_mark"], times["first_trigger_s"]["count"]) == (0.7, 10)
     assert conclude([])["claims"] == []
 
 
@@ -216,4 +218,4 @@ def test_a_rule_is_given_draws_in_their_order_however_they_end() -> None:
 
     rule = Rule("SAFE-TRACE", below=True, value=0.1)
     met = [rule.met_in_order(index, [row(index)]) for index in (3, 1, 2, 0)]
-    assert (met, seen) == ([False, False, False, True], [0, 1, 2])
+    assert (met, seen, rule.last) == ([False, False, False, True], [0, 1, 2], 2)

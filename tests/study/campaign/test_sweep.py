@@ -60,7 +60,8 @@ def made() -> pd.DataFrame:
             late = {"arrived": 2, "arrival_s": 10.0 + index} if run == "d" else {"arrived": 1, "arrival_s": 3.0}
             refuted = "refuted" if (index, run) == (1, "c") else "holds"
             rows.append(row(index, refuted, **common, **late, margin=-0.5 if refuted == "refuted" else 0.1 * index))
-            rows.append(row(index, claim="THR-TRIG", exercised=0.0, margin=math.nan, **common, **late))
+            if run == "d":
+                rows.append(row(index, claim="THR-TRIG", exercised=0.0, margin=math.nan, **common, **late))
     return table(rows)
 
 
@@ -77,4 +78,5 @@ def test_runs_are_counted_by_value() -> None:
     d = entries[1.0, "d"]
     assert (d["judged"], d["arrived"], d["arrival_s"]) == (2, 4, 12.0)
     assert d["claims"]["SAFE-TRACE"] == {"tested": 2, "refuted": 0, "undecided": 0, "margin": pytest.approx(0.1)}
-    assert d["claims"]["THR-TRIG"] == {"tested": 0, "refuted": 0, "undecided": 0, "margin": None}
+    for untested in (c, d):
+        assert untested["claims"]["THR-TRIG"] == {"tested": 0, "refuted": 0, "undecided": 0, "margin": None}

@@ -1,7 +1,8 @@
 """For each claim about a run: a record changed by twice its tolerance is refuted, and by half of it holds."""
 
 from collections.abc import Callable
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import persons
@@ -16,7 +17,7 @@ from verify.runs.cases import A_D, B_C, B_D, at, first, problem
 
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import MOTION_TOLERANCE_M, TIME_TOLERANCE_S
-from airground_drake.verify.claims import safe_hyp
+from airground_drake.verify.claims import live_hyp, safe_hyp
 from airground_drake.verify.claims.gate_plan import LONGER, SPEED_TOLERANCE, TIE
 from airground_drake.verify.claims.live_goal import AT_REST_M
 from airground_drake.verify.claims.thr_trig import EVENT_TOLERANCE_S, VARIABLE_TOLERANCE_M
@@ -183,6 +184,16 @@ def test_twice_the_tolerance_is_refuted_and_half_of_it_holds(
     found = CLAIMS[claim].judge(edit(base(name), 2.0 * tolerance))
     assert found.status == ("error" if shown == "error" else "refuted")
     assert shown in str(found.counterexample or found.evidence)
+
+
+def test_a_rest_and_the_time_after_it_may_be_off_by_rounding() -> None:
+    tries = [SimpleNamespace(t_s=t, end_s=end) for t, end in ((0.25, 0.5), (0.75, 1.0), (1.5, 2.0))]
+    for lacking, begins in ((-1.0, [0.0, 1.5]), (0.5, [0.0, 1.5]), (2.0, [0.0])):
+        assert live_hyp._after_rests(cast("Any", tries), 0.5 + lacking * TIME_TOLERANCE_S) == begins
+    given = {"t_s": 0.25 * np.arange(8), "ugv1.executing": np.array([-1.0, 0, -1, 1, -1, -1, 2, 2])}
+    trace = SimpleNamespace(sampled=given.get, scenario=SimpleNamespace(control=SimpleNamespace(period_s=0.25)))
+    for late in (0.0, 0.5):
+        assert live_hyp._executed_s(cast("Any", trace), "ugv1", [0.0, 1.5 + late * TIME_TOLERANCE_S]) == [0.5, 0.5]
 
 
 def test_every_claim_is_in_the_table_and_no_tolerance_is_wide() -> None:
