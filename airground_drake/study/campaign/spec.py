@@ -206,11 +206,18 @@ def load_spec(path: Path) -> Spec:
 
 
 def _check_overrides(spec: Spec, document: Document) -> None:
-    """Refuse values under `set` that are not valid or that a course replaces, and unknown keys under `draw`."""
+    """Refuse values under `set` that are not valid, values that are replaced, and unknown keys under `draw`."""
     for key in spec.fixed if spec.course is not None else ():
         if f"{key}.".startswith(tuple(f"{key_of}." for key_of in REPLACES)):
             wanted = "wanted: a key that the course does not draw; one under draw comes after the course"
             raise ScenarioError(document.where("set", key), f"set.{key}", Fault("the course would replace it"), wanted)
+    given: dict[str, str] = {}
+    for part, key in [*(("set", key) for key in spec.fixed), *(("draw", key) for key in spec.drawn)]:
+        if key in given:
+            fault = Fault(f"it would replace {given[key]}, which is given before")
+            raise ScenarioError(document.where(part, key), f"{part}.{key}", fault, "wanted: one value for each key")
+        names = key.split(".")
+        given.update((".".join(names[:n]), key) for n in range(1, 1 + len(names)))
     try:
         spec.base()
     except ScenarioError as error:

@@ -122,6 +122,14 @@ def test_a_course_has_one_uav(tmp_path: Path) -> None:
             "scenario: minimal\nmarks: {arrival: 2}",
             ":2: marks.arrival: 'arrival' is not allowed; did you mean arrival_",
         ),
+        (
+            "scenario: minimal\nset: {seed: 1}\ndraw: {seed: {choice: [2]}}",
+            ":3: draw.seed: it would replace seed, which",
+        ),
+        (
+            "scenario: minimal\ndraw: {obstacles.rock.position_m.0: {choice: [5]}, obstacles.rock: {choice: [{}]}}",
+            ":2: draw.obstacles.rock: it would replace obstacles.rock.position_m.0, which is given before; wanted: one",
+        ),
         ("scenario: minimal\nset: [1]", ":2: set: a list is given; wanted: a mapping with dotted keys"),
         ("scenario: minimal\nset: {contrl.period_s: 1}", ":2: set.contrl: unknown key; did you mean control?"),
         ("scenario: minimal\nset: {control.period_s: no}", ":2: set.control.period_s: 'no' is not allowed; wanted: a"),
