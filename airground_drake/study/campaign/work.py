@@ -14,6 +14,7 @@ import numpy as np
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError, described
 from airground_drake.base.statuses import PASSING
+from airground_drake.report.rules import PLANS
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import Limits, within
 from airground_drake.scenario.schema import Scenario
@@ -120,7 +121,9 @@ def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: 
     except (Exception, SystemExit) as error:
         return [common | {"ended": STOPPED, "what": described(error)}]
     common |= {"ended": JUDGED, "engine": judged.engine, "wall_s": time.perf_counter() - started, **judged.happened}
-    rows = [common | _of_claim(verdict) for verdict in judged.verdicts]
+    # A claim that is declared not to be judged here, such as one about the package's law, is not about this run.
+    about = [verdict for verdict in judged.verdicts if not (verdict.status == "not_run" and verdict.as_expected)]
+    rows = [common | _of_claim(verdict) for verdict in about]
     return rows or [common | {"what": "no claim is about this run"}]
 
 
@@ -205,7 +208,8 @@ def _of_claim(verdict: Verdict) -> Row:
         "what": broken,
         "status": verdict.status,
         "as_expected": verdict.as_expected is not False,
-        "margin": float("nan") if verdict.margin is None else float(verdict.margin),
+        # The number of GATE-PLAN is a gap to an optimum: the larger, the worse.
+        "margin": float("nan") if verdict.margin is None or verdict.claim.id == PLANS else float(verdict.margin),
         "unit": verdict.unit,
         "exercised": float("nan") if verdict.exercised is None else float(verdict.exercised),
     }
