@@ -168,4 +168,4 @@ def _by_value(entry: dict[str, Any]) -> str:
     parts = [f"{entry['arrived']} of {entry['ugvs']} arrived", *times]
     if refuted:
         parts.append(f"refuted: {', '.join(refuted)}")
-    return f"    {entry['value']!s:10} {entry['run']:10} {'; '.join(parts)}"
+    return f"    {entry['value']!s:10} {entry['run'] or 'none':10} {'; '.join(parts)}"

@@ -69,7 +69,7 @@ def conduct(
         progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
         for index, judged in pool(partial(rows_of, spec, limits=limits, engine=engine), left):
-            rows = died(index) if judged is None else judged
+            rows = died(index, spec.values(index)) if judged is None else judged
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
             counts = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
@@ -84,8 +84,8 @@ def conduct(
     if stopped is not None:  # other processes may have finished later draws meanwhile
         table = table[table["index"] <= stopped]
     runs = per_run(table) if spec.swept else table[:0]
-    of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept if key in runs]
-    result: dict[str, Any] = files.strict(evidence(table, spec.marks, spec.dependent)) | of
+    of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept]
+    result: dict[str, Any] = files.strict(evidence(table, spec.marks, spec.dependent) | of)
     files.write_json(folder / EVIDENCE, result)
     files.write_text(folder / PAGE, page(result, table))
     return result

@@ -66,12 +66,21 @@ def _keep_what_is_loaded() -> None:
 
 def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits, engine: Engine = "batch") -> list[Row]:
     """Simulate and judge any values by dotted key, on the course of a draw."""
-    common = blank() | {"index": index, "drawn": json.dumps(files.strict(values, str), allow_nan=False)}
+    common = _of_draw(index, values)
     try:
         scenario = spec.scenario_of(values, index)
     except ScenarioError as error:
         return [common | {"ended": INVALID, "what": str(error)}]
     return rows_of_scenario(spec, scenario, limits, common, engine)
+
+
+def died(index: int, values: Mapping[str, Any]) -> list[Row]:
+    """The row of a draw whose process died each time, with its values by dotted key."""
+    return [_of_draw(index, values) | {"ended": DIED, "what": "the process that simulated it died"}]
+
+
+def _of_draw(index: int, values: Mapping[str, Any]) -> Row:
+    return blank() | {"index": index, "drawn": json.dumps(files.strict(values, str), allow_nan=False)}
 
 
 def rows_of_scenario(
@@ -192,11 +201,6 @@ def _compared(trace: Trace, by_drake: Trace) -> str:
         quantity = f"run {trace.run} of {trace.meta['scenario']['name']}, seed {trace.meta['seed']}: {about} is"
         raise DifferenceError(f"{quantity} {drakes!r} by Drake and {ours!r} by the loop; --engine drake does without")
     return BOTH
-
-
-def died(index: int) -> list[Row]:
-    """The row of a draw whose process died each time."""
-    return [blank() | {"index": index, "ended": DIED, "what": "the process that simulated it died", "drawn": "{}"}]
 
 
 def _of_claim(verdict: Verdict) -> Row:

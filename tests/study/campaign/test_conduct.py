@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from airground_drake.study.campaign.conduct import EVIDENCE, Stopping, conduct
+from airground_drake.study.campaign.conduct import EVIDENCE, PAGE, Stopping, conduct
 from airground_drake.study.campaign.rows import JUDGED, Row, blank
 from airground_drake.study.campaign.spec import Spec, load_spec
 from airground_drake.study.campaign.statistics import confidence_sequence
@@ -22,7 +22,7 @@ def spec(folder: Path, drawn: str = "seed: {integer: [0, 1000]}") -> Spec:
 
 def row(index: int) -> Row:
     judged = {"ended": JUDGED, "claim": "SAFE-TRACE", "status": "holds", "as_expected": True, "exercised": 1.0}
-    return blank() | judged | {"index": index, "run": "d", "method": "d", "drawn": "{}"}
+    return blank() | judged | {"index": index, "run": "d", "method": "d", "drawn": '{"duration_s": 1.0}'}
 
 
 def draw_50_first(work: Callable[[int], Any], items: Iterable[int]) -> Iterator[tuple[int, Any]]:
@@ -49,3 +49,13 @@ def test_a_rule_needs_independent_draws(drawn: str, tmp_path: Path) -> None:
         conduct(spec(tmp_path, drawn), tmp_path / "out", draw_50_first, 100, stopping=rule)
     found = conduct(spec(tmp_path, drawn), tmp_path / "out", draw_50_first, 100)
     assert (found["dependent"], found["claims"][0]["anytime"]) == (["duration_s"], None)
+
+
+def test_a_draw_whose_process_died_has_its_values_in_a_sweep(tmp_path: Path) -> None:
+    def dying(work: Callable[[int], Any], items: Iterable[int]) -> Iterator[tuple[int, Any]]:
+        yield from ((index, None) for index in items)
+
+    found = conduct(spec(tmp_path, "duration_s: {grid: [1.0, 2.0]}"), tmp_path / "out", dying)
+    entries = [(each["value"], each["run"], each["runs"], each["judged"]) for each in found["swept"][0]["entries"]]
+    assert entries == [(1.0, "", 1, 0), (2.0, "", 1, 0)]
+    assert "<td>none (0 of 1 judged)</td>" in (tmp_path / "out" / PAGE).read_text()

@@ -69,7 +69,7 @@ def test_untested_runs_are_ignored_and_undecided_ones_count_against_the_claim() 
 
 def test_an_unfinished_run_is_undecided() -> None:
     """A run that was stopped, and a draw whose process died; not a draw without a valid scenario."""
-    rows = [*(row(i) for i in range(90)), stopped(90, "d"), *died(91)]
+    rows = [*(row(i) for i in range(90)), stopped(90, "d"), *died(91, {})]
     (claim,) = conclude([*rows, stopped(92, "c"), stopped(93, "", INVALID)])["claims"]
     assert counts(claim) == [92, 0, 2, 0]
     assert claim["fixed"] == pytest.approx([0.0, clopper_pearson(2, 92).high])
@@ -96,8 +96,8 @@ def test_a_draw_with_one_unfinished_run_is_not_judged_and_meets_no_rule() -> Non
         ([row(0, "refuted")], ("bad", "✗ 1 of 1 claims not as declared")),
         ([row(0, "refuted", as_expected=True)], ("tuned", "≈ 1 of 1 claims refuted, as the scenario admits")),
         ([row(0, "inconclusive")], ("open", "? 1 of 1 claims undecided in some draws")),
-        (died(0), ("open", "? 1 of 1 draws were not finished")),
-        ([row(0), *died(1)], ("open", "? 1 of 1 claims undecided in some draws")),
+        (died(0, {}), ("open", "? 1 of 1 draws were not finished")),
+        ([row(0), *died(1, {})], ("open", "? 1 of 1 claims undecided in some draws")),
         ([row(0, claim="", status="")], ("open", "? Nothing was judged")),
     ],
 )
