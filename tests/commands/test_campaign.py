@@ -68,6 +68,7 @@ def test_one_draw_alone_is_the_same_draw_and_a_scenario(spec: Path, tmp_path: Pa
         assert "SAFE-TRACE" in airground("campaign", spec, "--only", 1, "-o", tmp_path / "one.yaml")
     scenario = load(tmp_path / "one.yaml")
     assert (scenario.name, scenario.duration_s) == ("small_1", 1.0)
+    assert "THR-TRIG     not tested" in airground("campaign", spec, "--only", 1, "-o", tmp_path / "one.yaml")
 
 
 def test_more_combinations_than_memory_holds_are_refused(spec: Path, tmp_path: Path, airground: Airground) -> None:
