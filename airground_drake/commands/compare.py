@@ -86,7 +86,7 @@ def _lines(changes_of: Mapping[str, Any]) -> Iterator[str]:
 
 def _line(change: Mapping[str, Any]) -> str:
     about = " ".join(str(change[key]) for key in _ABOUT if change.get(key))
-    unit = f" {change['unit']}" if change.get("unit") else ""
+    unit = f" {change['unit']}" if change.get("unit") and change["after"] is not None else ""
     relative = change.get("relative")
     percent = "" if relative is None else f" ({100.0 * relative:+.3g} %)"
     expected = " (not as expected)" if change.get("as_expected") is False and change["after"] else ""

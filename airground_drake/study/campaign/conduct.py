@@ -92,7 +92,8 @@ def conduct(
 
 
 def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
-    return {
+    third_party = spec.third_party if limits.plugins else {}
+    return ({"third_party": third_party} if third_party else {}) | {
         "name": spec.name,
         "spec_sha256": spec.digest,
         "scenario_sha256": spec.base().digest,

@@ -2,11 +2,14 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from airground_drake.base.errors import FolderError
+from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.study.campaign.conduct import EVIDENCE, PAGE, Stopping, conduct
 from airground_drake.study.campaign.rows import JUDGED, Row, blank
 from airground_drake.study.campaign.spec import Spec, load_spec
@@ -49,6 +52,19 @@ def test_a_rule_needs_independent_draws(drawn: str, tmp_path: Path) -> None:
         conduct(spec(tmp_path, drawn), tmp_path / "out", draw_50_first, 100, stopping=rule)
     found = conduct(spec(tmp_path, drawn), tmp_path / "out", draw_50_first, 100)
     assert (found["dependent"], found["claims"][0]["anytime"]) == (["duration_s"], None)
+
+
+def test_a_campaign_goes_on_only_with_the_same_third_party_code(tmp_path: Path) -> None:
+    drawn = "intervention.policies: {choice: [[], [{name: 'mine.py:Mine'}]]}"
+    make = partial(
+        conduct, spec(tmp_path, drawn), tmp_path / "out", draw_50_first, limits=DEFAULT_LIMITS._replace(plugins=True)
+    )
+    (tmp_path / "mine.py").write_text("class Mine: pass")
+    make(3)
+    make(4, resume=True)
+    (tmp_path / "mine.py").write_text("class Mine: ...")
+    with pytest.raises(FolderError, match=r"another campaign \(third_party\)"):
+        make(5, resume=True)
 
 
 def test_a_draw_whose_process_died_has_its_values_in_a_sweep(tmp_path: Path) -> None:
