@@ -184,9 +184,11 @@ def test_two_claims_of_one_name_are_refused(before: Json, tmp_path: Path, capsys
 
 
 def test_what_the_clock_measured_is_not_compared(before: Json) -> None:
-    after = copy.deepcopy(before)
-    after["runs"]["c"]["metrics"]["wall_s"] = 17.0
-    assert not compare.compared(of(before), of(after))["metrics"]
+    reports = [copy.deepcopy(before), copy.deepcopy(before)]
+    for late, report in enumerate(reports):
+        clock = {"wall_s": 1.0 + late, "realtime_factor": 3.0 - late}
+        report["runs"]["c"]["metrics"] |= clock | {"gatekeeper": {"time_s": {"p50": 0.5 + late}, "late": late}}
+    assert not compare.compared(*map(of, reports))["metrics"]
 
 
 def test_the_page_shows_the_regression_first_and_nothing_foreign(
