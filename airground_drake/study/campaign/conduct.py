@@ -69,7 +69,7 @@ def conduct(
         progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
         for index, judged in pool(partial(rows_of, spec, limits=limits, engine=engine), left):
-            rows = died(index, spec.values(index)) if judged is None else judged
+            rows = judged or died(index, spec.values(index))
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
             counts = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))

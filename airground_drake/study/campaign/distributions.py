@@ -27,9 +27,7 @@ class Kind(NamedTuple):
 
 
 def _is_box(low: Any, high: Any) -> bool:
-    ends = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-    same = ends[0].shape == ends[1].shape and ends[0].ndim <= 1
-    return bool(same and (ends[0] <= ends[1]).all())
+    return np.shape(low) == np.shape(high) and np.ndim(low) <= 1 and bool(np.all(np.less_equal(low, high)))
 
 
 def _in_box(shares: Array, low: Any, high: Any) -> Any:

@@ -97,7 +97,7 @@ def drawn_keys(first: pd.DataFrame) -> pd.DataFrame:
         values = [of_draw.get(key) for of_draw in drawn]
         lengths = {*map(_length, values)}
         if len(lengths) == 1 and lengths != {0}:
-            columns |= {f"{key}.{i}": entries for i, entries in enumerate(zip(*values, strict=True))}
+            columns |= {f"{key}.{i}": [value[i] for value in values] for i in range(len(values[0]))}
         else:
             columns[key] = [value if type(value) in (int, float) else json.dumps(value) for value in values]
     return pd.DataFrame(columns, index=first["index"].tolist())

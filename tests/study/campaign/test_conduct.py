@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from study.campaign.test_evidence import row
 
 from airground_drake.base.errors import FolderError
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.study.campaign.conduct import EVIDENCE, PAGE, Stopping, conduct
-from airground_drake.study.campaign.rows import JUDGED, Row, blank
 from airground_drake.study.campaign.spec import Spec, load_spec
 from airground_drake.study.campaign.statistics import confidence_sequence
 from airground_drake.study.campaign.store import read
@@ -23,14 +23,9 @@ def spec(folder: Path, drawn: str = "seed: {integer: [0, 1000]}") -> Spec:
     return load_spec(path)
 
 
-def row(index: int) -> Row:
-    judged = {"ended": JUDGED, "claim": "SAFE-TRACE", "status": "holds", "as_expected": True, "exercised": 1.0}
-    return blank() | judged | {"index": index, "run": "d", "method": "d", "drawn": '{"duration_s": 1.0}'}
-
-
 def draw_50_first(work: Callable[[int], Any], items: Iterable[int]) -> Iterator[tuple[int, Any]]:
     for index in sorted(items, key=lambda index: (index < 50, index)):
-        yield index, [row(index)]
+        yield index, [row(index, drawn={"duration_s": 1.0})]
 
 
 def test_after_a_rule_has_stopped_a_campaign_only_draws_up_to_the_stop_count(tmp_path: Path) -> None:

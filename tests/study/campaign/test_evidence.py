@@ -16,6 +16,7 @@ from airground_drake.study.campaign.evidence import evidence
 from airground_drake.study.campaign.page import lines_of, page
 from airground_drake.study.campaign.rows import COLUMNS, INVALID, JUDGED, STOPPED, Row, blank
 from airground_drake.study.campaign.statistics import clopper_pearson, confidence_sequence, outward
+from airground_drake.study.campaign.store import table_of as table
 from airground_drake.study.campaign.work import died
 
 NAN = float("nan")
@@ -30,10 +31,6 @@ def row(index: int, status: str = "holds", **more: Any) -> Row:
 
 def stopped(index: int, run: str, ended: str = STOPPED) -> Row:
     return blank() | {"index": index, "run": run, "ended": ended, "drawn": "{}"}
-
-
-def table(rows: list[Row]) -> pd.DataFrame:
-    return pd.DataFrame(rows, columns=list(COLUMNS)).astype(COLUMNS)
 
 
 def conclude(rows: list[Row], **more: Any) -> dict[str, Any]:
