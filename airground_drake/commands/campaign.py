@@ -155,6 +155,8 @@ def _summary(result: dict[str, Any], *, looked: bool) -> str:
         lines.append(f"  {claim['run']:10} {claim['claim']:12} {outcome}{differs}")
     for swept in result.get("swept", ()):
         lines += [f"  by {swept['key']}:", *map(_by_value, swept["entries"])]
+    if result["stopped"] is not None:
+        lines.append(f"  stopped by its rule at draw {result['stopped']}; later draws are not counted")
     if result["dependent"]:
         lines.append(f"  no intervals: draws are not independent ({', '.join(result['dependent'])})")
     if result["not_judged"]:

@@ -115,7 +115,7 @@ def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded:
     margins = tested[tested["margin"].notna()]
     unmeasured = tested[(tested["status"] == "refuted") & tested["margin"].isna()]
     worst = pd.concat([unmeasured, margins.nsmallest(WORST, "margin")]).head(WORST)
-    unit = str(margins["unit"].mode().max()) if len(margins) else ""  # of SAFE-HYP each hypothesis has its own
+    unit = str(margins["unit"].mode().max()) if len(margins) else ""  # each hypothesis has its own
     violated = tested.set_index("index")["status"] == "refuted"
     undecided = rows["status"].isin(UNDECIDED)
     return {

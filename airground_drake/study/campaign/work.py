@@ -212,7 +212,7 @@ def _of_claim(verdict: Verdict) -> Row:
         "what": broken,
         "status": verdict.status,
         "as_expected": verdict.as_expected is not False,
-        # The number of GATE-PLAN is a gap to an optimum: the larger, the worse.
+        # The number of the claim about plans is a gap to an optimum: the larger, the worse.
         "margin": float("nan") if verdict.margin is None or verdict.claim.id == PLANS else float(verdict.margin),
         "unit": verdict.unit,
         "exercised": float("nan") if verdict.exercised is None else float(verdict.exercised),

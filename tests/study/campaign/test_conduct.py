@@ -10,6 +10,7 @@ import pytest
 from study.campaign.test_evidence import row
 
 from airground_drake.base.errors import FolderError
+from airground_drake.commands.campaign import _summary
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.study.campaign.conduct import EVIDENCE, PAGE, Stopping, conduct
 from airground_drake.study.campaign.spec import Spec, load_spec
@@ -35,6 +36,7 @@ def test_after_a_rule_has_stopped_a_campaign_only_draws_up_to_the_stop_count(tmp
     for resume in (False, True):
         found = conduct(spec(tmp_path), out, draw_50_first, 100, resume=resume, stopping=rule)
         assert (found["draws"], found["claims"][0]["tested"], found["stopped"]) == (last + 1, last + 1, last)
+        assert f"  stopped by its rule at draw {last}; later draws" in _summary(found, looked=True)
         assert json.loads((out / EVIDENCE).read_text()) == found
         assert len(read(out)[1]) == 50 + last + 1  # the others are kept
         rule = Stopping.parse("SAFE-TRACE < 0.2")
