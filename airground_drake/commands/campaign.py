@@ -13,6 +13,7 @@ from airground_drake.base.errors import AirgroundError, one_line
 from airground_drake.base.limits import MAX_SEED
 from airground_drake.base.parallel import one_thread_each, processors
 from airground_drake.base.progress import progress_bar
+from airground_drake.base.statuses import NOT_EXERCISED, outcome
 from airground_drake.base.usage import EXIT_TOOL, REFUSALS, positive, refuse, whole
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits
@@ -102,7 +103,8 @@ def _only(spec: Spec, options: argparse.Namespace) -> int:
     rows = rows_of(spec, options.only, _limits(options), options.engine)
     for row in rows:
         margin = "" if math.isnan(row["margin"]) else f" {row['margin']:.6g} {row['unit']}"
-        print(f"{row['run']:12} {row['claim'] or row['ended']:12} {row['status'] or row['what']}{margin}")
+        status = outcome(row["status"], row["exercised"]).replace(NOT_EXERCISED, "not tested")
+        print(f"{row['run']:12} {row['claim'] or row['ended']:12} {status or row['what']}{margin}")
     print(f"airground report {argument(path)}")
     result = evidence(table_of(rows))
     for what in _undecided(result):
@@ -138,6 +140,8 @@ def _name(claim: dict[str, Any]) -> str:
 
 def _summary(result: dict[str, Any], *, looked: bool) -> str:
     """The evidence as text. After intermediate looks only the anytime-valid bounds hold, so these are given then."""
+    from airground_drake.study.campaign.statistics import outward
+
     ended = ", ".join(f"{count} {name}" for name, count in result["ended"].items())
     lines = [f"{result['name']}: {result['draws']} draws ({ended}), {result['simulated_s']:.0f} s simulated"]
     for claim in result["claims"]:
@@ -145,11 +149,14 @@ def _summary(result: dict[str, Any], *, looked: bool) -> str:
         if not claim["tested"]:
             outcome += ", not tested by any run"
         elif bounds := claim["anytime" if looked else "fixed"]:
-            outcome += f", probability of a violation {bounds[0]:.2g} to {bounds[1]:.2g}"
+            low, high = outward(bounds)
+            outcome += f", probability of a violation {low:.2g} to {high:.2g}"
         differs = f"; {claim['differs']} not as expected" if claim["differs"] else ""
         lines.append(f"  {claim['run']:10} {claim['claim']:12} {outcome}{differs}")
     for swept in result.get("swept", ()):
         lines += [f"  by {swept['key']}:", *map(_by_value, swept["entries"])]
+    if result["stopped"] is not None:
+        lines.append(f"  stopped by its rule at draw {result['stopped']}; later draws are not counted")
     if result["dependent"]:
         lines.append(f"  no intervals: draws are not independent ({', '.join(result['dependent'])})")
     if result["not_judged"]:
@@ -168,4 +175,4 @@ def _by_value(entry: dict[str, Any]) -> str:
     parts = [f"{entry['arrived']} of {entry['ugvs']} arrived", *times]
     if refuted:
         parts.append(f"refuted: {', '.join(refuted)}")
-    return f"    {entry['value']!s:10} {entry['run']:10} {'; '.join(parts)}"
+    return f"    {entry['value']!s:10} {entry['run'] or 'none':10} {'; '.join(parts)}"

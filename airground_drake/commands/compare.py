@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from airground_drake.report.model import Report
 
 EXIT_WORSE = 1
-PARTS = ("inputs", "overall", "verdicts", "margins", "exercised", "expectations", "reproduction", "audit", "events")
+PARTS = (
+    "inputs", "overall", "verdicts", "seeds", "margins", "exercised", "expectations", "reproduction", "audit", "events",
+    "metrics",
+)  # fmt: skip
 MOST_LINES, MOST_ROWS = 20, 200  # changes of one part that are shown, in the terminal and on the page; `--json` has all
 _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
@@ -26,18 +29,19 @@ _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 def parser() -> Parser:
     return parser_of(
         "compare",
-        "List the differences of two reports: keys of the scenario and versions, then verdicts, margins, counts of "
-        "tests, events. Changes by rounding are only counted.",
+        "List the differences of two reports: keys of the scenario and versions, then verdicts, runs with other seeds, "
+        "margins, counts of tests, events, metrics. Changes by rounding are only counted.",
         {
             "before": option("folder of a report", "BEFORE", Path),
             "after": option("folder of another report", "AFTER", Path),
             "--json": None,
             "--html": option("write a page", "FILE", output_file),
-            "--exact": "exit code 1 if any result differs, to the last digit",
+            "--exact": "exit code 1 if any of these results differs, to the last digit",
         },
         "verdicts from the best to the worst: "
         + "; ".join(map(", ".join, compare.ORDER)).replace("exercised", "tested").replace("_", " ")
-        + ". A verdict that is no longer the expected one is worse, too. Exit codes: 0 nothing got worse, 1 "
+        + ". A verdict that is no longer the expected one is worse, too; so is a run with another seed that no longer "
+        "keeps distances or brings all UGVs home. Exit codes: 0 nothing got worse, 1 "
         "something did (with --exact: any result differs), 2 usage, or a folder is not a report.",
     )
 
@@ -64,8 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _lines(changes_of: Mapping[str, Any]) -> Iterator[str]:
     changed, rounded = [], 0
     for part in PARTS:
-        hidden = compare.rounded(changes_of, part)
-        changes = [change for change in changes_of[part] if change not in hidden]
+        changes, hidden = compare.parted(changes_of, part)
         changes.sort(key=lambda change: not change.get("worse"))
         rounded += len(hidden)
         if changes:
@@ -83,7 +86,7 @@ def _lines(changes_of: Mapping[str, Any]) -> Iterator[str]:
 
 def _line(change: Mapping[str, Any]) -> str:
     about = " ".join(str(change[key]) for key in _ABOUT if change.get(key))
-    unit = f" {change['unit']}" if change.get("unit") else ""
+    unit = f" {change['unit']}" if change.get("unit") and change["after"] is not None else ""
     relative = change.get("relative")
     percent = "" if relative is None else f" ({100.0 * relative:+.3g} %)"
     expected = " (not as expected)" if change.get("as_expected") is False and change["after"] else ""
@@ -111,6 +114,6 @@ def _page(folders: tuple[Path, Path], before: Report, after: Report, changed: Ma
     ]
     return render_beside(
         "compare.html.j2", before=before, after=after, found=changed, parts=PARTS, most=MOST_ROWS, regressions=worse,
-        rounded={part: compare.rounded(changed, part) for part in PARTS},
+        parted={part: compare.parted(changed, part) for part in PARTS},
         places=[str(folder) for folder in folders],
     )  # fmt: skip

@@ -48,7 +48,7 @@ def parser() -> Parser:
         "--jobs": None,
         "-q --quiet": None,
         plugins.OPTION: None,
-    }, "exit codes: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was judged, 4 tool "
+    }, "exit codes: 0 no counterexample, 1 one was found, 2 usage, bad spec or output, 3 nothing was measured, 4 tool "
         "error, 130 and 143 interrupted")  # fmt: skip
 
 
@@ -103,11 +103,10 @@ def _run(spec: Spec, options: argparse.Namespace) -> int:
         best = falsify(search, sampler, options.number, processes, progress)
     tried = f"{spec.name}: {best.tried} tried by {options.sampler}"
     if not len(best.point):
-        print(f"{tried}, never judged: no {options.most or f'margin of {options.claim}'} in any of them")
+        missing = options.most or f"violation and no margin of {options.claim}"
+        print(f"{tried}, no {missing} in any of them: undecided")
         return EXIT_UNDECIDED
-    what = f"least margin of {options.claim}" if options.most is None else f"largest {options.most}"
-    value = best.value if options.most is None else -best.value
-    print(f"{tried}, {what} {value:.6g}: {'a' if best.found else 'no'} counterexample")
+    print(f"{tried}, {objective.said(best.value)}: {'a' if best.found else 'no'} counterexample")
     if best.found or options.output:
         _save(search, best, path, options.shrink)
     return EXIT_FOUND if best.found else 0

@@ -38,11 +38,13 @@ def _write(place: Path) -> Path:
     page = place / PAGE
     if page.exists() and MARK.encode() not in files.read_bytes(page):
         raise FolderError(f"{page} is not a list of reports that `airground index` has made; it is left alone")
-    below = sorted(path.parent for path in place.glob("**/report.json") if path.parent != place)
+    below = sorted({path.parent for path in place.glob("**/*/report.json")})
     entries: list[dict[str, Any]] = []
     problems = []
-    for report in filter(folder.is_report, below):
+    for report in below:
         try:
+            if report.is_symlink():
+                raise FolderError(f"{report} is a link; wanted: a folder")
             entries.append(_entry(report, place, f"run-{len(entries)}"))
         except (ReportError, FolderError) as error:
             problems.append(str(error))

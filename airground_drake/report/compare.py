@@ -1,8 +1,9 @@
 """The changes between two reports, read from their report.json alone.
 
 A verdict is worse if it stands further down in `ORDER` than before, if it was as expected and no longer is, or if it
-is gone. A row of the reproduction table is worse by `ROWS`, and a finding about the paper if it is no longer
-demonstrated. Numbers are compared to the last digit.
+is gone. A row of the reproduction table is worse by `ROWS`, a finding about the paper if it is no longer demonstrated,
+and a run with another seed if it no longer keeps distances or brings all UGVs home. Numbers are compared to the last
+digit.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from airground_drake.base.errors import ReportError
 from airground_drake.base.statuses import UNDECIDED, outcome
 from airground_drake.report.sentences import grouped
 
@@ -29,6 +31,10 @@ WITHIN = 1e-8  # numbers agree to this times 1 plus their size: versions of nump
 
 VERSIONS = ("package", "drake", "python", "packages", "git")  # what the provenance says about the code
 NO_INPUTS = ("title", "description")  # keys of a scenario that nothing depends on
+KEPT = ("kept", "home")  # about a run with another seed: distances were kept, and all UGVs arrived
+# Of a run: compared by `_events`, or measured by the clock.
+_CLOCK: Any = {"wall_s": True, "realtime_factor": True, "gatekeeper": {"time_s": True, "late": True}}
+NOT_COMPARED: Any = {"events": True, "metrics": _CLOCK}
 
 Change = dict[str, Any]
 E = TypeVar("E", bound="Entry")
@@ -36,19 +42,22 @@ E = TypeVar("E", bound="Entry")
 
 def compared(before: Report, after: Report) -> dict[str, Any]:
     # Returns strict JSON: `regressions`, a count; lists of changes `inputs`, `overall` (one at most), `verdicts`,
-    # `margins`, `exercised`, `expectations`, `reproduction`, `audit`, `events`. A change has `before` and `after` (None
-    # if missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`, `robot`, `kind` and
-    # `n`, the number of the event among those of its kind, from 1. Margins have their `relative` change.
+    # `seeds`, `margins`, `exercised`, `expectations`, `reproduction`, `audit`, `events`, `metrics`. A change has
+    # `before` and `after` (None if missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or
+    # `run`, `robot`, `kind` and `n`, the number of the event among those of its kind, from 1. Margins have their
+    # `relative` change.
     changes_of: dict[str, Any] = {
         "inputs": list(_inputs(before, after)),
         "overall": list(_overall(before, after)),
         "verdicts": list(_verdicts(before, after)),
+        "seeds": list(_seeds(before, after)),
         "margins": [{**change, "relative": _relative(change)} for change in _of_claims(before, after, "margin")],
         "exercised": list(_of_claims(before, after, "exercised")),
         "expectations": list(_of_claims(before, after, "expected")),
         "reproduction": list(_rows(before, after)),
         "audit": list(_findings(before, after)),
         "events": list(_events(before, after)),
+        "metrics": list(_metrics(before, after)),
     }
     for change in (changes := [change for part in changes_of.values() for change in part]):
         change.setdefault("worse", False)
@@ -79,12 +88,13 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def rounded(changes_of: Mapping[str, Any], part: str) -> list[Change]:
-    """The changes within rounding of a part; changes of the inputs always count."""
-    return [
-        change for change in changes_of[part]
-        if part != "inputs" and not change["worse"] and not any(differences(change["before"], change["after"]))
-    ]  # fmt: skip
+def parted(changes_of: Mapping[str, Any], part: str) -> tuple[list[Change], list[Change]]:
+    """The changes of a part beyond rounding, and those within; changes of the inputs always count."""
+    large, small = list[Change](), list[Change]()
+    for change in changes_of[part]:
+        counts = part == "inputs" or change["worse"] or any(differences(change["before"], change["after"]))
+        (large if counts else small).append(change)
+    return large, small
 
 
 def _inputs(before: Report, after: Report) -> Iterator[Change]:
@@ -125,6 +135,24 @@ def _verdicts(before: Report, after: Report) -> Iterator[Change]:
             worse = old is not None and (lost or _rank(ORDER, now) > _rank(ORDER, was))
             change = {"claim": claim, "run": run, "before": was if old else None, "after": now if new else None}
             yield {**change, "worse": worse, "as_expected": bool(new and new.as_expected is not False)}
+
+
+def _seeds(before: Report, after: Report) -> Iterator[Change]:
+    """Changes of the outcomes of runs with other seeds."""
+    for (run, seed), old, new in _paired(before.seeds, after.seeds, "run", "seed"):
+        was, now = (
+            row and {"kept": row.kept, "home": row.home, **row.model_dump(by_alias=True, exclude={"run", "seed"})}
+            for row in (old, new)
+        )
+        if was != now:
+            worse = old is not None and any(getattr(old, key) and not getattr(new, key, False) for key in KEPT)
+            yield {"id": f"{run}, seed {seed}", "before": was, "after": now, "worse": worse}
+
+
+def _metrics(before: Report, after: Report) -> Iterator[Change]:
+    """Differences of other records of the runs, by dotted key."""
+    old, new = ({name: run.model_dump(exclude=NOT_COMPARED) for name, run in of.runs.items()} for of in (before, after))
+    yield from _differing(old, new, "")
 
 
 def _of_claims(before: Report, after: Report, field: str) -> Iterator[Change]:
@@ -168,6 +196,9 @@ def _paired(
 ) -> Iterator[tuple[tuple[str, ...], E | None, E | None]]:
     """Entries with the same key in both lists, and those in only one of them."""
     old, new = ({tuple(str(getattr(entry, key)) for key in keys): entry for entry in part} for part in (before, after))
+    for side, of, part in (("before", old, before), ("after", new, after)):
+        if len(of) < len(part):
+            raise ReportError(f"the report {side} has several entries of the same {' and '.join(keys)}; wanted: one")
     for key in dict.fromkeys([*old, *new]):
         yield key, old.get(key), new.get(key)
 

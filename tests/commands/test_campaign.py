@@ -68,14 +68,15 @@ def test_one_draw_alone_is_the_same_draw_and_a_scenario(spec: Path, tmp_path: Pa
         assert "SAFE-TRACE" in airground("campaign", spec, "--only", 1, "-o", tmp_path / "one.yaml")
     scenario = load(tmp_path / "one.yaml")
     assert (scenario.name, scenario.duration_s) == ("small_1", 1.0)
+    assert "THR-TRIG     not tested" in airground("campaign", spec, "--only", 1, "-o", tmp_path / "one.yaml")
 
 
 def test_more_combinations_than_memory_holds_are_refused(spec: Path, tmp_path: Path, airground: Airground) -> None:
-    values = ", ".join(map(str, range(5000)))
-    grids = "".join(f"  {key}: {{grid: [{values}]}}\n" for key in ("seed", "duration_s", "control.motion_gain_1_s"))
+    grid = f"{{grid: [{', '.join(map(str, range(400)))}]}}"
+    grids = "".join(f"  obstacles.o{k}.radius_m: {grid}\n" for k in range(120))
     spec.write_text(f"scenario: minimal\nclaims: [SAFE-HYP]\ndraw:\n{grids}", encoding="utf-8")
     said = airground("campaign", spec, "-o", tmp_path / "out", code=2)
-    assert "small asks for about 1.25e+11 draws (2.5e+11 rows); allowed: 4e+06 rows" in said
+    assert "small asks for about 1.77e+312 draws (3.53e+312 rows); allowed: 4e+06 rows" in said
     assert not (tmp_path / "out").exists()
 
 

@@ -144,5 +144,5 @@ def test_a_claim_that_applies_to_no_run_is_refused(falsified: Airground) -> None
 @pytest.mark.usefixtures("in_this_process")
 def test_where_nothing_is_measured_it_says_so(falsified: Airground, tmp_path: Path) -> None:
     said = falsified("a", "--most", "first_trigger_s", "--sampler", "halton", code=3, duration="0.1")
-    assert said == "pushed: 2 tried by halton, never judged: no first_trigger_s in any of them\n"
+    assert said == "pushed: 2 tried by halton, no first_trigger_s in any of them: undecided\n"
     assert not (tmp_path / "found.yaml").exists()

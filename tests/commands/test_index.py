@@ -29,6 +29,9 @@ def test_every_report_is_there_with_its_verdict_a_link_and_a_picture(
     save(tmp_path / "plain", document)
     save(tmp_path / "a b" / "100%", document, title="<script>alert(1)</script>")
     save(tmp_path / "bad", {**document, "claims": 3})
+    save(tmp_path / "empty", document)
+    (tmp_path / "empty" / "report.json").write_text("")
+    (tmp_path / "latest").symlink_to(tmp_path / "plain")
     (tmp_path / "plain" / "report.html").touch()
     run = list(document["runs"])[-1]
     trace.save(make_traces(make_scenario())[run], tmp_path / "plain" / "trace" / run)
@@ -38,7 +41,8 @@ def test_every_report_is_there_with_its_verdict_a_link_and_a_picture(
     for words, times in (
         ("2 reports in", 1), ('href="plain/report.html"', 1), ('href="a%20b/100%25/report.json"', 1), ("<svg", 1),
         ("as declared</span>", 2), ("<strong>With the UAV (c): 1 of 2 arrive, ugv1 and obstacle_1 too close.", 2),
-        ("bad/report.json is not a report", 1), ("<script", 0),
+        ("bad/report.json is not a report", 1), ("empty/report.json is not a report", 1), ("latest is a link", 1),
+        ("<script", 0),
     ):  # fmt: skip
         assert page.count(words) == times, words
     assert "no trace" in page

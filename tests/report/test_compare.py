@@ -11,6 +11,7 @@ import pytest
 from report.cases import FINE, built, make_scenario, make_traces, verdict
 
 from airground_drake import commands
+from airground_drake.base.errors import ReportError
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES
 from airground_drake.report import compare
 from airground_drake.report.model import of
@@ -38,6 +39,8 @@ def before() -> Json:
     counted = [*FINE, verdict("", "proved", "proved", exercised=3, margin=0.5)]
     found = built(scenario, make_traces(scenario), counted)
     found["audit"] = [{"id": 1, "demonstrated": True, "paper": 1, "ours": 2}]
+    apart = {"first": "ugv1", "second": "o", "min_distance_m": 3.0, "safe_distance_m": 2.0, "t_s": 1.0}
+    found["seeds"] = [{"run": "c", "seed": seed, "kept": True, "home": True, **apart} for seed in (1, 2)]
     return json.loads(json.dumps(found))
 
 
@@ -58,6 +61,9 @@ WORSE: dict[str, Callable[[Json], object]] = {
     "a finding": lambda found: found["audit"][0].update(demonstrated=False),
     "a finding that is gone": lambda found: found["audit"].pop(),
     "a claim that is missing": lambda found: found["overall"].update(status="inconclusive"),
+    "a distance under another seed": lambda found: found["seeds"][0].update(kept=False),
+    "an arrival under another seed": lambda found: found["seeds"][0].update(home=False),
+    "a seed that is gone": lambda found: found["seeds"].pop(),
 }
 OTHER: dict[str, Callable[[Json], object]] = {
     "a margin": lambda found: claim(found, "").update(margin=0.4),
@@ -68,6 +74,9 @@ OTHER: dict[str, Callable[[Json], object]] = {
     "an expectation": lambda found: claim(found, "a").update(expected="nothing"),
     "a new claim": lambda found: found["claims"].append({**found["claims"][0], "id": "NEW", "status": "refuted"}),
     "a time": lambda found: found["runs"]["c"]["events"][0].update(t_s=14.0),
+    "a distance": lambda found: found["runs"]["c"]["metrics"]["final_position_m"].update(ugv1=[0.0, 0.0, 0.0]),
+    "a fault": lambda found: found["runs"]["c"]["faults"].append({"t_s": 1.0, "robot": "ugv1", "what": "x"}),
+    "a seed's distance": lambda found: found["seeds"][0].update(min_distance_m=0.1),
     "an event less": lambda found: found["runs"]["c"]["events"].pop(),
     "a run less": lambda found: found["runs"].pop("c"),
     "a value": lambda found: found["reproduction"][0].update(ours=[3.31, 5.1]),
@@ -176,6 +185,22 @@ def test_values_of_another_kind_are_no_report(
     change(bad)
     assert main([str(save(tmp_path / "a", before)), str(save(tmp_path / "b", bad))]) == 2
     assert f"b/report.json is not a report that can be used: {why}" in capsys.readouterr().err
+
+
+def test_two_claims_of_one_name_are_refused(before: Json) -> None:
+    """The later one could hide the violation of the other."""
+    after = copy.deepcopy(before)
+    after["claims"].insert(0, {**claim(after, "a"), "status": "refuted", "as_expected": False})
+    with pytest.raises(ReportError, match="the report after has several entries of the same id and run; wanted: one"):
+        compare.compared(of(before), of(after))
+
+
+def test_what_the_clock_measured_is_not_compared(before: Json) -> None:
+    reports = [copy.deepcopy(before), copy.deepcopy(before)]
+    for late, report in enumerate(reports):
+        clock = {"wall_s": 1.0 + late, "realtime_factor": 3.0 - late}
+        report["runs"]["c"]["metrics"] |= clock | {"gatekeeper": {"time_s": {"p50": 0.5 + late}, "late": late}}
+    assert not compare.compared(*map(of, reports))["metrics"]
 
 
 def test_the_page_shows_the_regression_first_and_nothing_foreign(

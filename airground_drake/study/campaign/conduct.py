@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
+from decimal import Decimal
 from functools import partial
 from importlib.metadata import version
 from itertools import groupby
@@ -54,7 +55,7 @@ def conduct(
     asked = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
     if asked > MOST_ROWS:
         allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
-        raise LimitError(spec.name, f"{wanted.stop:.3g} draws ({asked:.3g} rows)", allowed)
+        raise LimitError(spec.name, f"{Decimal(wanted.stop):.3g} draws ({Decimal(asked):.3g} rows)", allowed)
     if not limits.plugins:
         spec.refuse_plugins()
     store = Store(folder, _manifest(spec, limits), resume=resume)
@@ -68,7 +69,7 @@ def conduct(
         progress.stage(spec.name, len(left), "draws")
         refuted = Counter[str]()
         for index, judged in pool(partial(rows_of, spec, limits=limits, engine=engine), left):
-            rows = died(index) if judged is None else judged
+            rows = judged or died(index, spec.values(index))
             store.add(rows)
             refuted.update(row["claim"] for row in rows if row["status"] == "refuted")
             counts = ", ".join(f"{claim} {count}" for claim, count in refuted.most_common(3))
@@ -83,15 +84,16 @@ def conduct(
     if stopped is not None:  # other processes may have finished later draws meanwhile
         table = table[table["index"] <= stopped]
     runs = per_run(table) if spec.swept else table[:0]
-    of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept if key in runs]
-    result: dict[str, Any] = files.strict(evidence(table, spec.marks, spec.dependent)) | of
+    of["swept"] = [{"key": key, "entries": by_value(runs, key)} for key in spec.swept]
+    result: dict[str, Any] = files.strict(evidence(table, spec.marks, spec.dependent) | of)
     files.write_json(folder / EVIDENCE, result)
     files.write_text(folder / PAGE, page(result, table))
     return result
 
 
 def _manifest(spec: Spec, limits: Limits) -> dict[str, Any]:
-    return {
+    third_party = spec.third_party if limits.plugins else {}
+    return ({"third_party": third_party} if third_party else {}) | {
         "name": spec.name,
         "spec_sha256": spec.digest,
         "scenario_sha256": spec.base().digest,

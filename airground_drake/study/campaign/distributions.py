@@ -3,6 +3,7 @@
 import math
 import zlib
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -26,9 +27,7 @@ class Kind(NamedTuple):
 
 
 def _is_box(low: Any, high: Any) -> bool:
-    ends = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-    same = ends[0].shape == ends[1].shape and ends[0].ndim <= 1
-    return bool(same and np.isfinite(ends).all() and (ends[0] <= ends[1]).all())
+    return np.shape(low) == np.shape(high) and np.ndim(low) <= 1 and bool(np.all(np.less_equal(low, high)))
 
 
 def _in_box(shares: Array, low: Any, high: Any) -> Any:
@@ -37,7 +36,7 @@ def _in_box(shares: Array, low: Any, high: Any) -> Any:
 
 
 def _is_normal(mean: float, sd: float, low: float = -math.inf, high: float = math.inf) -> bool:
-    return math.isfinite(mean) and 0.0 < float(sd) < math.inf and float(low) < float(high)
+    return 0.0 < sd < math.inf and low < high
 
 
 def _normal(shares: Array, mean: float, sd: float, low: float = -math.inf, high: float = math.inf) -> float:
@@ -54,7 +53,7 @@ KINDS: dict[str, Kind] = {
     HALTON: Kind("[low, high], numbers or lists of numbers", _is_box, _in_box),
     "log_uniform": Kind(
         "[low, high] with 0 < low",
-        lambda low, high: 0.0 < float(low) <= float(high) < math.inf and high / low < math.inf,
+        lambda low, high: 0.0 < low <= high,
         lambda shares, low, high: float(low * (high / low) ** shares[0]),
     ),
     "normal": Kind("[mean, standard deviation], and [..., low, high] to cut it", _is_normal, _normal),
@@ -88,13 +87,19 @@ class Key:
         """The value at shares (size,): a number, a list of numbers, or any other value of a scenario."""
         return KINDS[self.kind].at(shares, *self.given)
 
+    @property
+    def is_of_numbers(self) -> bool:
+        """Whether the parameters are numbers or lists of them, and so are the least and the largest value."""
+        ends = [self.at(np.full(self.size, share)) for share in (0.0, np.nextafter(1.0, 0.0))]
+        kinds = {type(number) for number in np.asarray(self.given, dtype=object).flat}
+        return self.size > 0 and kinds <= {int, float} and bool(np.isfinite(ends).all())
+
 
 def made(kind: str, given: Any) -> Key:
-    try:
-        if isinstance(given, list) and KINDS[kind].allows(*given):
-            return Key(kind, given)
-    except (ValueError, TypeError, OverflowError):
-        pass
+    with suppress(ValueError, TypeError, ArithmeticError), np.errstate(all="ignore"):
+        key = Key(kind, given)
+        if isinstance(given, list) and KINDS[kind].allows(*given) and (key.choices or key.is_of_numbers):
+            return key
     raise ValueError(f"wanted: {KINDS[kind].wanted}")
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
-from scipy.stats import chi2_contingency
+from scipy.stats import MonteCarloMethod, chi2_contingency
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.statuses import UNDECIDED
@@ -23,6 +23,7 @@ BINS = 4  # parts of a key in maps of where a claim fails: quarters of its draws
 MOST_VALUES = 12  # most values of a key that is not a number, such as lists of policies, in these maps
 MOST_LISTED = 50  # runs that are listed at most; the dataset has them all
 UNRELATED = "seed"  # a key that cannot explain a failure: neighbouring seeds of the noise are unrelated
+TABLES = 999  # tables that are drawn for a p-value, for each pair of keys
 BY_CHANCE = 0.05  # significance level: a map is shown if its differences have a p-value below this
 QUANTILES = (0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 
@@ -89,25 +90,32 @@ def evidence(table: pd.DataFrame, marks: Mapping[str, float] | None = None, depe
 
 
 def drawn_keys(first: pd.DataFrame) -> pd.DataFrame:
-    """The drawn values by index and key: numbers as they are, an entry of a list as key.0, other values as text."""
+    """The drawn values by index and key: numbers as they are, entries of lists of one length as key.0, or text."""
+    drawn = [json.loads(text) for text in first["drawn"]]
+    columns: dict[str, Any] = {}
+    for key in dict.fromkeys(chain.from_iterable(drawn)):
+        values = [of_draw.get(key) for of_draw in drawn]
+        lengths = {*map(_length, values)}
+        if len(lengths) == 1 and lengths != {0}:
+            columns |= {f"{key}.{i}": [value[i] for value in values] for i in range(len(values[0]))}
+        else:
+            columns[key] = [value if type(value) in (int, float) else json.dumps(value) for value in values]
+    return pd.DataFrame(columns, index=first["index"].tolist())
 
-    def entries(key: str, value: Any) -> Json:
-        if isinstance(value, list) and all(isinstance(item, int | float) for item in value):
-            return {f"{key}.{i}": item for i, item in enumerate(value)}
-        return {key: value if type(value) in (int, float) else json.dumps(value)}
 
-    by_index = {}
-    for index, text in zip(first["index"], first["drawn"], strict=True):
-        pairs = (entries(key, value).items() for key, value in json.loads(text).items())
-        by_index[index] = dict(chain.from_iterable(pairs))
-    return pd.DataFrame.from_dict(by_index, orient="index")
+def _length(value: Any) -> int:
+    """The length of a list of numbers; 0 for any other value."""
+    numbers = isinstance(value, list) and all(type(item) in (int, float) for item in value)
+    return len(value) if numbers else 0
 
 
 def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded: bool) -> Json:
     counts = Counts.of(rows, unfinished)
     tested = rows[_tested(rows)]
     margins = tested[tested["margin"].notna()]
-    worst = margins.nsmallest(WORST, "margin")
+    unmeasured = tested[(tested["status"] == "refuted") & tested["margin"].isna()]
+    worst = pd.concat([unmeasured, margins.nsmallest(WORST, "margin")]).head(WORST)
+    unit = str(margins["unit"].mode().max()) if len(margins) else ""  # each hypothesis has its own
     violated = tested.set_index("index")["status"] == "refuted"
     undecided = rows["status"].isin(UNDECIDED)
     return {
@@ -117,9 +125,9 @@ def _claim(rows: pd.DataFrame, unfinished: int, drawn: pd.DataFrame, *, bounded:
         "untested": not counts.tested and not rows["as_expected"].all(),
         "fixed": list(counts.interval(anytime=False)) if bounded else None,
         "anytime": list(counts.interval(anytime=True)) if bounded else None,
-        "unit": str(rows["unit"].iloc[0]),
-        "margins": _quantiles(margins["margin"].to_numpy()),
-        "worst": worst[["index", "margin", "status"]].to_dict("records"),
+        "unit": unit,
+        "margins": _quantiles(margins.loc[margins["unit"] == unit, "margin"].to_numpy()),
+        "worst": worst[["index", "margin", "unit", "status"]].to_dict("records"),
         "broken_first": Counter(what.partition(",")[0] for what in rows["what"] if what),
         "refuted_draws": tested.loc[tested["status"] == "refuted", "index"].head(WORST).tolist(),
         "undecided_draws": rows.loc[undecided, "index"].head(WORST).tolist(),
@@ -145,7 +153,9 @@ def _quantiles(values: Array) -> dict[str, float]:
 
 def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
     """Count violations and runs in each pair of quarters of the two keys by which violations differ most."""
-    # None if chance may explain the differences, by the least p-value of all pairs times their number (Bonferroni).
+    # None if chance may explain the differences: the p-value of the pair of largest effect, times the number of pairs
+    # (Bonferroni). It is that of tables drawn with the same sums, because the chi-squared distribution is wrong where
+    # few violations fall into many cells.
     keys = drawn.loc[violated.index].drop(columns=UNRELATED, errors="ignore")
     parts = {str(key): part for key in keys if (part := _parts(keys[key])) is not None}
     tables = {
@@ -155,7 +165,8 @@ def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
     if not tables:
         return None
     pair = min(tables, key=lambda pair: _by_chance(tables[pair].to_numpy()))
-    chance = len(tables) * _by_chance(tables[pair].to_numpy())
+    drawn_tables = MonteCarloMethod(TABLES * len(tables), batch=TABLES, rng=np.random.default_rng(0))
+    chance = len(tables) * _by_chance(tables[pair].to_numpy(), drawn_tables)
     if chance >= BY_CHANCE:
         return None
     cells = [
@@ -166,9 +177,9 @@ def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
     return {"keys": list(pair), "by_chance": chance, "cells": cells}
 
 
-def _by_chance(table: Array) -> float:
+def _by_chance(table: Array, method: MonteCarloMethod | None = None) -> float:
     """Probability of differences as large if the keys have no effect (chi-squared test)."""
-    return float(chi2_contingency(table).pvalue) if min(table.shape) > 1 else 1.0
+    return float(chi2_contingency(table, correction=False, method=method).pvalue) if min(table.shape) > 1 else 1.0
 
 
 def _parts(values: pd.Series) -> pd.Series | None:
@@ -178,6 +189,11 @@ def _parts(values: pd.Series) -> pd.Series | None:
     if not is_numeric_dtype(values) or values.nunique() <= BINS:
         texts = values.astype(str)
     else:
-        quarters = pd.qcut(values, BINS, duplicates="drop")
-        texts = quarters.map(lambda part: f"{part.left:.4g} to {part.right:.4g}").astype(str)
+        quarters = pd.qcut(values, BINS, labels=False, duplicates="drop")
+        ends = values.groupby(quarters).agg(["min", "max"])
+        for digits in (4, 17):  # more if quarters could not be told apart
+            words = {quarter: f"{low:.{digits}g} to {high:.{digits}g}" for quarter, low, high in ends.itertuples()}
+            if len({*words.values()}) == len(words):
+                break
+        texts = quarters.map(words)
     return texts.reset_index(drop=True) if len(texts.unique()) > 1 else None

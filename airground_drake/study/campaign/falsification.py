@@ -22,7 +22,7 @@ from airground_drake.study.campaign.search import Sampler
 from airground_drake.study.campaign.spec import Spec
 from airground_drake.study.campaign.work import rows_at, rows_of_scenario
 
-FAILED = -1.0  # value of a violation that has no margin
+FAILED = -1.0  # value of a violation without a margin below 0
 LATEST_S = 1e9  # time of an arrival that never happens, s; infinity would mean "not measured"
 
 
@@ -37,6 +37,9 @@ class Margin:
 
     def found(self, rows: Sequence[Row]) -> bool:
         return any(row["claim"] == self.claim and row["status"] == "refuted" for row in rows)
+
+    def said(self, value: float) -> str:
+        return f"{self.claim} is refuted" if value == FAILED else f"least margin of {self.claim} {value:.6g}"
 
     def _of(self, row: Row) -> float:
         if row["status"] == "refuted":
@@ -58,10 +61,14 @@ class Most:
     def found(self, rows: Sequence[Row]) -> bool:
         return self.value(rows) < -self.limit
 
+    def said(self, value: float) -> str:
+        return "a UGV does not arrive" if -value == LATEST_S else f"largest {self.column} {-value:.6g}"
+
     def _of(self, row: Row) -> float:
-        """The value of a row, LATEST_S for a UGV that does not arrive."""
-        never = self.column == "arrival_s" and row["arrived"] < row["ugvs"]
-        return LATEST_S if never else float(row[self.column])
+        """The value of a row; LATEST_S for a UGV that does not arrive, NaN if the run was shorter than the limit."""
+        if self.column != "arrival_s" or row["arrived"] == row["ugvs"]:
+            return float(row[self.column])
+        return math.nan if row["duration_s"] < self.limit < math.inf else LATEST_S
 
 
 Objective = Margin | Most

@@ -15,8 +15,11 @@ from airground_drake.report import rules
 from airground_drake.report.html import environment_of
 from airground_drake.report.sentences import MARKS, Line, number
 from airground_drake.report.view import canvas, svg
+from airground_drake.scenario.shipped import argument
 from airground_drake.study.campaign import swept
+from airground_drake.study.campaign.evidence import MOST_LISTED
 from airground_drake.study.campaign.rows import BATCH, BOTH, CLOCK, DRAKE, JUDGED, SCREENED
+from airground_drake.study.campaign.statistics import outward
 
 BARS = 40
 MOST_CLAIMS = 8  # sentences about claims on the first screen; the others are folded
@@ -47,22 +50,24 @@ def lines_of(result: Mapping[str, Any]) -> list[Line]:
     lines = []
     for claim in result["claims"]:
         what = f"{claim['claim']} in run {claim['run']}"
-        bounds = claim["anytime"]
+        bounds = claim["anytime"] and [number(bound, 2) for bound in outward(claim["anytime"])]
         confidence = f"confidence {result.get('confidence', 0.0):g}"
+        differs = f", {claim['differs']} not as declared" if claim["differs"] != claim["refuted"] else ""
         if claim["untested"]:
             lines.append(Line("open", f"{what}: the scenario expects a test, but no run tested it."))
         elif claim["refuted"]:
-            bound = f"; probability {number(bounds[0], 2)} to {number(bounds[1], 2)} ({confidence})" if bounds else ""
-            admitted = "" if claim["differs"] else ", which the scenario admits"
+            bound = f"; probability {bounds[0]} to {bounds[1]} ({confidence})" if bounds else ""
+            admitted = differs if claim["differs"] else ", which the scenario admits"
             counts = claim["broken_first"].items()
             first = f"; broken first: {', '.join(f'{name} ({count})' for name, count in counts)}" if counts else ""
             runs = f"refuted in {claim['refuted']} of {claim['tested']} runs{admitted}"
             lines.append(Line("no", f"{what}: {runs}{first}{bound}."))
         elif claim["undecided"]:
-            lines.append(Line("open", f"{what}: undecided in {claim['undecided']} runs."))
+            lines.append(Line("open", f"{what}: undecided in {claim['undecided']} of {claim['tested']} runs{differs}."))
         elif claim["tested"]:
-            bound = f"; probability of a violation at most {number(bounds[1], 2)} ({confidence})" if bounds else ""
-            lines.append(Line("yes", f"{what}: never refuted in {claim['tested']} runs{bound}."))
+            bound = f"; probability of a violation at most {bounds[1]} ({confidence})" if bounds else ""
+            mark = "no" if differs else "yes"
+            lines.append(Line(mark, f"{what}: never refuted in {claim['tested']} runs{differs}{bound}."))
         else:
             lines.append(Line("none", f"{what}: not tested."))
     return sorted(lines, key=lambda line: ("no", "open", "yes", "none").index(line.mark))
@@ -128,11 +133,9 @@ def _shares(cells: Sequence[Mapping[str, Any]]) -> str:
 def _figures(result: dict[str, Any], table: pd.DataFrame) -> list[Drawing]:
     judged = table[table["ended"] == JUDGED]
     drawn = []
-    for (run, claim), rows in judged[judged["claim"].isin(SHOWN)].groupby(["run", "claim"]):
-        values = rows["margin"].dropna().to_numpy()
-        if len(values):
-            unit = rows["unit"].iloc[0]
-            drawn.append(_histogram(values, f"{claim} in run {run}: margin", f"margin, {unit}", 0.0))
+    measured = judged[judged["claim"].isin(SHOWN) & judged["margin"].notna()]
+    for (run, claim, unit), rows in measured.groupby(["run", "claim", "unit"]):
+        drawn.append(_histogram(rows["margin"].to_numpy(), f"{claim} in run {run}: margin", f"margin, {unit}", 0.0))
     runs = judged.drop_duplicates(["index", "run"])
     marks = {times["run"]: times["first_trigger_s"].get("mark") for times in result["times"]}
     for run, rows in runs.groupby("run"):
@@ -168,6 +171,6 @@ def _histogram(values: Array, title: str, label: str, mark: float | None) -> tup
 @cache
 def _environment() -> Environment:
     environment = environment_of("airground_drake.study.campaign", "airground_drake.report")
-    environment.filters["num"] = number
-    environment.globals.update(marks=MARKS, most_claims=MOST_CLAIMS)
+    environment.filters.update(num=number, outward=outward, argument=argument)
+    environment.globals.update(marks=MARKS, most_claims=MOST_CLAIMS, most_listed=MOST_LISTED)
     return environment

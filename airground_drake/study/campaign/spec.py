@@ -13,7 +13,8 @@ claims: [SAFE-TRACE]          # default: all claims about runs
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -162,15 +163,24 @@ class Spec(File):
         Raises:
             ScenarioError: if any is named; says where, and how to allow it.
         """
-        plugins.refuse(self.base(), self.scenario)
+        for scenario, source in self._alternatives():
+            plugins.refuse(scenario, source)
+
+    @property
+    def third_party(self) -> dict[str, str]:
+        """SHA-256 of the files of third-party code in the scenario and in everything that may be drawn, by class."""
+        with plugins.beside(self.scenario, allow=True), plugins.beside(self.source, allow=True):
+            digests = [plugins.digests(scenario) for scenario, _ in self._alternatives()]
+        return {name: digest for of_scenario in digests for name, digest in of_scenario.items()}
+
+    def _alternatives(self) -> Iterator[tuple[Scenario, str]]:
+        """The scenario before anything is drawn, and with each value that may be chosen; each with its file."""
+        yield self.base(), self.scenario
         first = self.values(0)
         for key, drawn in self.drawn.items():
             for value in drawn.choices:
-                try:
-                    scenario = self.scenario_of(first | {key: value}, 0)
-                except ScenarioError:
-                    continue  # such a draw is invalid
-                plugins.refuse(scenario, self.source)
+                with suppress(ScenarioError):  # such a draw is invalid
+                    yield self.scenario_of(first | {key: value}, 0), self.source
 
     @cached_property
     def _fixed_part(self) -> Scenario:
@@ -206,11 +216,18 @@ def load_spec(path: Path) -> Spec:
 
 
 def _check_overrides(spec: Spec, document: Document) -> None:
-    """Refuse values under `set` that are not valid or that a course replaces, and unknown keys under `draw`."""
+    """Refuse values under `set` that are not valid, values that are replaced, and unknown keys under `draw`."""
     for key in spec.fixed if spec.course is not None else ():
         if f"{key}.".startswith(tuple(f"{key_of}." for key_of in REPLACES)):
             wanted = "wanted: a key that the course does not draw; one under draw comes after the course"
             raise ScenarioError(document.where("set", key), f"set.{key}", Fault("the course would replace it"), wanted)
+    given: dict[str, str] = {}
+    for part, key in [*(("set", key) for key in spec.fixed), *(("draw", key) for key in spec.drawn)]:
+        if key in given:
+            fault = Fault(f"it would replace {given[key]}, which is given before")
+            raise ScenarioError(document.where(part, key), f"{part}.{key}", fault, "wanted: one value for each key")
+        names = key.split(".")
+        given.update((".".join(names[:n]), key) for n in range(1, 1 + len(names)))
     try:
         spec.base()
     except ScenarioError as error:

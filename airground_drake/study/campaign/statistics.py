@@ -5,6 +5,8 @@ confidence: the first for an n fixed beforehand, the second for all n at once, s
 """
 
 import math
+from collections.abc import Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import NamedTuple
 
 from scipy.optimize import brentq
@@ -12,6 +14,7 @@ from scipy.special import betaln
 from scipy.stats import beta
 
 CONFIDENCE = 0.95
+DIGITS = 2  # of bounds in words
 
 
 class Interval(NamedTuple):
@@ -19,6 +22,12 @@ class Interval(NamedTuple):
 
     low: float
     high: float
+
+
+def outward(bounds: Sequence[float]) -> Interval:
+    """The bounds with DIGITS digits: the lower one is rounded down and the upper one up."""
+    ways = zip(bounds, (ROUND_FLOOR, ROUND_CEILING), strict=True)
+    return Interval(*(float(Context(DIGITS, rounding=way).create_decimal(bound)) for bound, way in ways))
 
 
 def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:

@@ -141,14 +141,14 @@ def _be_the_same(folder: Path, manifest: dict[str, Any]) -> None:
 def _manifest(folder: Path) -> dict[str, Any] | None:
     try:
         manifest = json.loads(files.read_text(folder / MANIFEST))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     return manifest if isinstance(manifest, dict) and manifest.get("schema") == SCHEMA else None
 
 
 def _read_parts(folder: Path, manifest: dict[str, Any]) -> pd.DataFrame:
-    if (folder / PARTS).is_symlink():
-        raise FolderError(f"{folder / PARTS} is a link; wanted: a folder")
+    if (folder / PARTS).is_symlink() or (folder / PARTS).is_file():
+        raise FolderError(f"{folder / PARTS} is a link or a file; wanted: a folder")
     parts, seen = [table_of([])], set[int]()
     for path in sorted((folder / PARTS).glob("*.parquet")):
         parts.append(_read_part(path))
@@ -165,9 +165,10 @@ def _read_part(path: Path) -> pd.DataFrame:
         part = files.read_table(_content(path))
     except ValueError as error:
         raise FolderError(f"{path}: {error}") from None
-    if missing := [name for name in COLUMNS if name not in part]:
-        raise FolderError(f"{path} has no column {missing[0]!r}; allowed: parts as campaigns write them")
-    return part
+    for name, kind in table_of([]).dtypes.items():
+        if name not in part or part[name].dtype != kind:
+            raise FolderError(f"{path} has no column {name!r} of type {kind}; allowed: parts as campaigns write them")
+    return part[list(COLUMNS)]
 
 
 def _content(path: Path) -> bytes:
@@ -189,7 +190,7 @@ def _read_journal(path: Path, manifest: dict[str, Any], known: set[int]) -> tupl
         try:
             rows = _as_written(path, manifest, json.loads(line))
             index = rows[0]["index"]
-        except (ValueError, TypeError, LookupError):
+        except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError):
             cut = line.decode(errors="replace")[:80]
             raise FolderError(f"{path} has a line that is no draw: {cut}") from None
         if index not in known:

@@ -69,7 +69,7 @@ def sweep(
         draws = {index: work(index) for index in indices}
     else:
         with pool.local(jobs) as processes:
-            draws = {index: died(index) if rows is None else rows for index, rows in processes(work, indices)}
+            draws = {index: rows or died(index, spec.values(index)) for index, rows in processes(work, indices)}
     return per_run(table_of(list(chain.from_iterable(draws[index] for index in indices))))
 
 

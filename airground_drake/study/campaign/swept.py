@@ -15,7 +15,7 @@ from airground_drake.report import rules
 from airground_drake.report.view import canvas, svg
 from airground_drake.study.campaign.rows import JUDGED
 
-# Columns about a run, besides its claims.
+# Columns about a run, besides its claims. A drawn key of the same name, `ugvs`, gets a column `ugvs drawn`.
 OF_A_RUN = ("ended", "what", "ugvs", "arrived", "arrival_s", "triggers", "first_trigger_s", "intervened_s")
 MARGIN = " margin"
 # Claims whose margins are drawn, if they were judged: the first of them.
@@ -34,7 +34,7 @@ def per_run(table: pd.DataFrame) -> pd.DataFrame:
         table: rows of `rows.COLUMNS`, as `store.read` gives.
 
     Returns:
-        Columns `index`; each drawn key (numbers as they are, other values as JSON); `run`; those of `OF_A_RUN`; and for
+        Columns `index`; `column_of` each drawn key (numbers as they are, others as JSON); `run`; `OF_A_RUN`; and for
         each claim CLAIM its verdict and, as `CLAIM margin`, its margin, NaN without one.
     """
     runs = table.drop_duplicates(["index", "run"]).set_index(["index", "run"])
@@ -50,7 +50,14 @@ def per_run(table: pd.DataFrame) -> pd.DataFrame:
 
 def _plain(text: str) -> Json:
     values = json.loads(text)
-    return {key: value if type(value) in (int, float) else json.dumps(value) for key, value in values.items()}
+    return {
+        column_of(key): value if type(value) in (int, float) else json.dumps(value) for key, value in values.items()
+    }
+
+
+def column_of(key: str) -> str:
+    """The column of a drawn key in `per_run`."""
+    return f"{key} drawn" if key in OF_A_RUN else key
 
 
 def by_value(runs: pd.DataFrame, key: str) -> list[Json]:
@@ -67,7 +74,7 @@ def by_value(runs: pd.DataFrame, key: str) -> list[Json]:
     """
     claims = [str(name).removesuffix(MARGIN) for name in runs if str(name).endswith(MARGIN)]
     entries = []
-    for (value, run), rows in runs.groupby([key, "run"], sort=True, dropna=False):
+    for (value, run), rows in runs.groupby([column_of(key), "run"], sort=True, dropna=False):
         judged = rows[rows["ended"] == JUDGED]
         all_there = judged[judged["arrived"] == judged["ugvs"]]
         entries.append({
@@ -92,7 +99,7 @@ def _number(value: float) -> float | None:
 
 def drawing(entries: Sequence[Json], key: str, name: str) -> Markup:
     """Margin, share that arrived, and time of arrival by the value of a key, as inline SVG."""
-    runs = list(dict.fromkeys(entry["run"] for entry in entries))[:MOST_RUNS]
+    runs = list(dict.fromkeys(entry["run"] for entry in entries if entry["judged"]))[:MOST_RUNS]
     values = list(dict.fromkeys(entry["value"] for entry in entries))
     numbers = all(isinstance(value, int | float) for value in values)
     places = {value: float(value) if numbers else float(k) for k, value in enumerate(values)}
@@ -117,7 +124,8 @@ def drawing(entries: Sequence[Json], key: str, name: str) -> Markup:
                 for value, at in places.items():
                     axes.text(at, -0.06, canvas.short(str(value), 14), transform=axes.get_xaxis_transform(),
                               ha="center", va="top", fontsize=8.5)  # fmt: skip
-        axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False, fontsize=8.5)
+        if runs:
+            axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False, fontsize=8.5)
         text = canvas.svg(figure)
     title = f"What became of the runs, by {key}"
     return Markup(svg.inline(text, name, title, "; ".join(label for label, _ in panels)))

@@ -14,6 +14,7 @@ import numpy as np
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError, described
 from airground_drake.base.statuses import PASSING
+from airground_drake.report.rules import PLANS
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import Limits, within
 from airground_drake.scenario.schema import Scenario
@@ -65,12 +66,21 @@ def _keep_what_is_loaded() -> None:
 
 def rows_at(spec: Spec, values: Mapping[str, Any], index: int, limits: Limits, engine: Engine = "batch") -> list[Row]:
     """Simulate and judge any values by dotted key, on the course of a draw."""
-    common = blank() | {"index": index, "drawn": json.dumps(files.strict(values, str), allow_nan=False)}
+    common = _of_draw(index, values)
     try:
         scenario = spec.scenario_of(values, index)
     except ScenarioError as error:
         return [common | {"ended": INVALID, "what": str(error)}]
     return rows_of_scenario(spec, scenario, limits, common, engine)
+
+
+def died(index: int, values: Mapping[str, Any]) -> list[Row]:
+    """The row of a draw whose process died each time, with its values by dotted key."""
+    return [_of_draw(index, values) | {"ended": DIED, "what": "the process that simulated it died"}]
+
+
+def _of_draw(index: int, values: Mapping[str, Any]) -> Row:
+    return blank() | {"index": index, "drawn": json.dumps(files.strict(values, str), allow_nan=False)}
 
 
 def rows_of_scenario(
@@ -120,7 +130,9 @@ def _rows_of_run(scenario: Scenario, run: str, claims: Collection[str], common: 
     except (Exception, SystemExit) as error:
         return [common | {"ended": STOPPED, "what": described(error)}]
     common |= {"ended": JUDGED, "engine": judged.engine, "wall_s": time.perf_counter() - started, **judged.happened}
-    rows = [common | _of_claim(verdict) for verdict in judged.verdicts]
+    # A claim that is declared not to be judged here, such as one about the package's law, is not about this run.
+    about = [verdict for verdict in judged.verdicts if not (verdict.status == "not_run" and verdict.as_expected)]
+    rows = [common | _of_claim(verdict) for verdict in about]
     return rows or [common | {"what": "no claim is about this run"}]
 
 
@@ -191,11 +203,6 @@ def _compared(trace: Trace, by_drake: Trace) -> str:
     return BOTH
 
 
-def died(index: int) -> list[Row]:
-    """The row of a draw whose process died each time."""
-    return [blank() | {"index": index, "ended": DIED, "what": "the process that simulated it died", "drawn": "{}"}]
-
-
 def _of_claim(verdict: Verdict) -> Row:
     against = verdict.counterexample or {}
     who = " and ".join(str(against[key]) for key in ("robot", "first", "second", "other") if key in against)
@@ -205,7 +212,8 @@ def _of_claim(verdict: Verdict) -> Row:
         "what": broken,
         "status": verdict.status,
         "as_expected": verdict.as_expected is not False,
-        "margin": float("nan") if verdict.margin is None else float(verdict.margin),
+        # The number of the claim about plans is a gap to an optimum: the larger, the worse.
+        "margin": float("nan") if verdict.margin is None or verdict.claim.id == PLANS else float(verdict.margin),
         "unit": verdict.unit,
         "exercised": float("nan") if verdict.exercised is None else float(verdict.exercised),
     }

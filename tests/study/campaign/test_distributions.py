@@ -76,6 +76,8 @@ def test_halton_keys_are_one_sequence_and_a_late_point_needs_none_before() -> No
         ("uniform", [1.0]), ("uniform", [2.0, 1.0]), ("uniform", [[1.0], [2.0, 3.0]]), ("uniform", ["a", "b"]),
         ("uniform", 3), ("uniform", [1, 10**400]), ("halton", [0.0, float("nan")]), ("normal", [0.0, 0.0]),
         ("normal", [1.0]), ("normal", [1, 10**400]), ("normal", [0.0, 1.0, 2.0, 1.0]), ("integer", [0.5, 2]),
+        ("normal", [1.0, "0.1"]), ("normal", [1.0, 0.1, "0", "2"]), ("normal", [0, 1e-300, 1, 2]),
+        ("uniform", ["0", "1"]), ("uniform", [False, True]), ("uniform", [-1.7e308, 1.7e308]), ("uniform", [[], []]),
         ("integer", [3, 2]), ("integer", [0, 10**400]), ("choice", []), ("choice", "abc"), ("grid", {}),
     ],
 )  # fmt: skip

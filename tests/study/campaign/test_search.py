@@ -9,7 +9,7 @@ import pytest
 from airground_drake.base.errors import ScenarioError
 from airground_drake.base.registry import SAMPLERS
 from airground_drake.scenario.load import from_data, load, resolved
-from airground_drake.study.campaign.falsification import Margin, Most
+from airground_drake.study.campaign.falsification import LATEST_S, Margin, Most
 from airground_drake.study.campaign.rows import JUDGED, Row, blank
 from airground_drake.study.campaign.search import Sampler
 from airground_drake.study.campaign.shrink import shrink
@@ -61,6 +61,9 @@ def test_objectives() -> None:
     last = Most("arrival_s", 20.0)
     assert last.found([row(arrival_s=9.0, arrived=1, ugvs=2)]), "one that never arrives is later than any limit"
     assert last.value([row(arrival_s=9.0, arrived=2, ugvs=2)]) == -9.0
+    assert not last.found([row(duration_s=19.0, arrived=1, ugvs=2)]), "a run that is shorter than the limit"
+    assert (last.said(-9.0), last.said(-LATEST_S)) == ("largest arrival_s 9", "a UGV does not arrive")
+    assert margin.said(margin.value([row(status="refuted", margin=float("nan"))])) == "SAFE-TRACE is refuted"
 
 
 def test_what_does_not_matter_goes() -> None:

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -84,7 +85,9 @@ def test_a_long_journal_becomes_a_part_and_a_removed_part_is_made_again(
     assert indices(tmp_path) == sorted(2 * list(range(7)))
 
 
-@pytest.mark.parametrize("line", ["[]", "{}", "5", "null", '[{"run": "d"}]'])
+@pytest.mark.parametrize(
+    "line", ["[]", "{}", "5", "null", '[{"run": "d"}]', "[" * 10**5, json.dumps([blank() | {"ugvs": math.inf}])]
+)
 def test_a_journal_of_something_else_is_refused(line: str, tmp_path: Path) -> None:
     opened(tmp_path).close()
     (tmp_path / JOURNAL).write_text(f"{line}\n")
@@ -134,10 +137,13 @@ def test_a_foreign_a_repeated_and_an_incomplete_part_are_refused(tmp_path: Path)
         path.write_bytes(part)
         with pytest.raises(FolderError, match="draw 3: "):
             read(path.parents[1])
-    for column in ("index", "margin"):
+    changes: list[tuple[str, Edit]] = [("index", lambda rows: rows.drop(columns="index"))]
+    for name, value in (("index", None), ("ugvs", 0.9), ("ugvs", math.inf), ("margin", [1.0]), ("as_expected", "")):
+        changes.append((name, lambda rows, name=name, value=value: rows.assign(**{name: [value] * 2})))  # type: ignore[misc]
+    for column, change in changes:
         path.write_bytes(part)
-        edit_part(tmp_path / "b", lambda rows, column=column: rows.drop(columns=column))  # type: ignore[misc]
-        with pytest.raises(FolderError, match=f"no column '{column}'"):
+        edit_part(tmp_path / "b", change)
+        with pytest.raises(FolderError, match=f"no column '{column}' of type {COLUMNS[column]}"):
             read(tmp_path / "b")
 
 
@@ -181,6 +187,9 @@ def test_a_folder_of_something_else_or_of_another_campaign_is_refused(tmp_path: 
     for key, value in (("spec_sha256", "1"), ("limits", {"time": 2.0})):
         with pytest.raises(FolderError, match=rf"another campaign \({key}\)"):
             opened(tmp_path / "c", **{key: value})
+    (tmp_path / "c" / "campaign.json").write_text("[" * 10**5)
+    with pytest.raises(FolderError, match="no campaign to resume"):
+        opened(tmp_path / "c")
 
 
 def test_one_command_at_a_time_and_the_later_one_changes_nothing(

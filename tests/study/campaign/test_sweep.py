@@ -80,3 +80,10 @@ def test_runs_are_counted_by_value() -> None:
     assert d["claims"]["SAFE-TRACE"] == {"tested": 2, "refuted": 0, "undecided": 0, "margin": pytest.approx(0.1)}
     for untested in (c, d):
         assert untested["claims"]["THR-TRIG"] == {"tested": 0, "refuted": 0, "undecided": 0, "margin": None}
+
+
+def test_a_key_may_be_named_like_a_column() -> None:
+    runs = per_run(table([row(k, drawn={"ugvs": {f"u{i}": 1 for i in range(k)}}, ugvs=k) for k in (1, 2)]))
+    assert [(each["value"], each["ugvs"]) for each in by_value(runs, "ugvs")] == [
+        ('{"u0": 1, "u1": 1}', 2), ('{"u0": 1}', 1),
+    ]  # fmt: skip

@@ -20,7 +20,8 @@ from airground_drake.study.campaign import work
 from airground_drake.study.campaign.rows import BATCH, BOTH, CLOCK, COLUMNS, DRAKE, INVALID, JUDGED, SCREENED, STOPPED
 from airground_drake.study.campaign.spec import Spec, load_spec
 from airground_drake.uav.database import Asked
-from airground_drake.verify import array_judges
+from airground_drake.verify import Verdict, array_judges
+from airground_drake.verify.finding import Finding
 
 CASE_A = Path(__file__).parents[3] / "benchmarks" / "campaigns" / "case_a.yaml"
 TEXT = """
@@ -78,6 +79,18 @@ def test_a_row_for_each_run_and_claim(spec: Spec) -> None:
     safe = next(row for row in rows if row["claim"] == "SAFE-TRACE")
     assert safe["margin"] >= 0.0
     assert math.isnan(safe["first_trigger_s"])
+
+
+def test_a_gap_to_an_optimum_is_no_margin_and_what_is_declared_not_to_be_judged_has_no_row(
+    spec: Spec, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plans, following = work.run_claims(["GATE-PLAN", "LIVE-HYP"])
+    given = [(plans, "holds", "holds"), (following, "not_run", "not_run"), (following, "not_run", "holds")]
+    verdicts = [Verdict.of(claim, "a", Finding(status, margin=0.5), expected) for claim, status, expected in given]
+    monkeypatch.setattr(work, "_judged", lambda *_: work._Judged(verdicts, {}, DRAKE))
+    rows = work.rows_of(replace(spec, runs=("a",)), 0, DEFAULT_LIMITS)
+    assert [(row["claim"], row["as_expected"]) for row in rows] == [("GATE-PLAN", True), ("LIVE-HYP", False)]
+    assert [row["margin"] for row in rows] == pytest.approx([math.nan, 0.5], nan_ok=True)
 
 
 @pytest.mark.parametrize(
