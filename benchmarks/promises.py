@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from airground_drake.base.errors import ScenarioError
+from airground_drake.report.rules import OURS
 from airground_drake.scenario.budget import budget
 from airground_drake.scenario.load import from_data
 from airground_drake.scenario.schema import Obstacle, Scenario
@@ -264,7 +265,7 @@ def _doings(trace: Trace, pairs: dict[tuple[str, str], Course], compare: Any) ->
     """Whose doing: who is cleared took nothing, and what never moved took nothing."""
     for encounter in encounters(trace):
         pair = encounter.first, encounter.second
-        if pair not in pairs or encounter.doing in ("robot", "under way"):
+        if pair not in pairs or encounter.doing in OURS:
             continue
         obstacle = trace.scenario.obstacles.get(encounter.second)
         compare("cleared", pair, 0.0, -_own_m(pairs[pair]))
