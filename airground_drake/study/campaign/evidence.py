@@ -164,9 +164,9 @@ def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
     }
     if not tables:
         return None
-    pair = min(tables, key=lambda pair: _by_chance(tables[pair].to_numpy()))
+    pair = min(tables, key=lambda pair: _by_chance(tables[pair].to_numpy()))  # many draws: several p-values are 0
     drawn_tables = MonteCarloMethod(TABLES * len(tables), batch=TABLES, rng=np.random.default_rng(0))
-    chance = len(tables) * _by_chance(tables[pair].to_numpy(), drawn_tables)
+    chance = len(tables) * _by_chance(tables[pair].to_numpy(), drawn_tables)[0]
     if chance >= BY_CHANCE:
         return None
     cells = [
@@ -177,9 +177,12 @@ def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
     return {"keys": list(pair), "by_chance": chance, "cells": cells}
 
 
-def _by_chance(table: Array, method: MonteCarloMethod | None = None) -> float:
-    """Probability of differences as large if the keys have no effect (chi-squared test)."""
-    return float(chi2_contingency(table, correction=False, method=method).pvalue) if min(table.shape) > 1 else 1.0
+def _by_chance(table: Array, method: MonteCarloMethod | None = None) -> tuple[float, float]:
+    """Probability of differences as large if the keys have no effect, and less chi-squared for each cell."""
+    if min(table.shape) < 2:
+        return 1.0, 0.0
+    found = chi2_contingency(table, correction=False, method=method)
+    return float(found.pvalue), -float(found.statistic) / table.size
 
 
 def _parts(values: pd.Series) -> pd.Series | None:

@@ -149,6 +149,12 @@ def test_it_finds_the_keys_by_which_a_claim_fails() -> None:
     bad_cells = [cell for cell in where["cells"] if cell["refuted"]]
     assert {cell["where"]["policies"] for cell in bad_cells} == {"[]"}
     assert conclude(by_chance)["claims"][0]["fails_where"] is None
+    by_two = []
+    for i in range(4000):  # so many that several p-values are 0
+        other, gain, noise = rng.random(3).tolist()
+        drawn = {"other": other, "gain": gain, "noise": noise}
+        by_two.append(row(i, "refuted" if gain + 0.3 * noise > 0.65 else "holds", drawn=drawn))
+    assert conclude(by_two)["claims"][0]["fails_where"]["keys"] == ["gain", "noise"]
     near = [row(i, "refuted" if i < 20 else "holds", drawn={"far": 1e6 + i / 10}) for i in range(40)]
     assert len(conclude(near)["claims"][0]["fails_where"]["cells"]) == 4
 
