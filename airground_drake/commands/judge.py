@@ -102,8 +102,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         logs = [str(path) for path in options.logs]
         written = page.write(options.output, judged, joined, scenario, errors, logs)
     if options.json:
-        found = judging.as_json(judged, joined) | {"said": [*joined.remarks, *words.remarks(judged)]}
-        print(json.dumps(found, indent=1, allow_nan=False))
+        as_json = judging.as_json(judged, joined) | {"said": [*joined.remarks, *words.remarks(judged)]}
+        print(json.dumps(as_json, indent=1, allow_nan=False))
     else:
         for line in words.lines(judged, joined):
             print(one_line(line))

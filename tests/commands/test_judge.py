@@ -150,8 +150,8 @@ def test_the_verdict_comes_first_with_margin_time_and_whose_doing_it_was(
 
 
 def test_json_has_all_remarks(log: list[Path | str], airground: Airground) -> None:
-    found = json.loads(airground("judge", *log, "--json", "--set", "ugvs.tb_0.start_m=[-1.5,0,0]", code=1))
-    assert found["said"][-1].startswith("robots do not start as in the scenario: tb_0 by 0.5 m; if the log is in")
+    printed = json.loads(airground("judge", *log, "--json", "--set", "ugvs.tb_0.start_m=[-1.5,0,0]", code=1))
+    assert printed["said"][-1].startswith("robots do not start as in the scenario: tb_0 by 0.5 m; if the log is in")
 
 
 def test_a_position_error_that_decides_is_exit_code_1(log: list[Path | str], airground: Airground) -> None:

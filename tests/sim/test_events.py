@@ -96,8 +96,8 @@ def test_each_proposal_has_its_answer_and_events_of_one_time_are_by_robot(run: C
     (t_s,), (first, second, *_) = accepted["t_s"], trace.ugvs
     decisions = pd.concat([accepted.assign(robot=first, number=number) for number in (0, 1)])
     sent_to = trace.proposals.head(1).assign(robot=second, issued_s=t_s)
-    found = events.extract(replace(trace, decisions=decisions, proposals=sent_to))
-    told = [(event["robot"], event["kind"]) for event in found if event["kind"] in ("accept", "proposal")]
+    extracted = events.extract(replace(trace, decisions=decisions, proposals=sent_to))
+    told = [(event["robot"], event["kind"]) for event in extracted if event["kind"] in ("accept", "proposal")]
     assert told == [(first, "accept")] * 2 + [(second, "proposal")]
 
 

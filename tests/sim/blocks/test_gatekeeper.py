@@ -147,8 +147,7 @@ def test_after_a_failure_the_rest_of_the_plan_before_counts(case_a: Scenario, mo
             solutions.append(super().solve(problem, budget))
             if solutions[-1].has_plan:
                 plan = problem.evaluate(np.arange(1, problem.stages + 1) % 7 % 2.0)
-                found = replace(solutions[-1], accept_first=True, plan=plan.omega, positions=plan.positions)
-                solutions[-1] = found
+                solutions[-1] = replace(solutions[-1], accept_first=True, plan=plan.omega, positions=plan.positions)
             return solutions[-1]
 
     def listening(problem: Problem, solution: Solution) -> Solution:

@@ -68,7 +68,7 @@ def test_a_draw_whose_process_died_has_its_values_in_a_sweep(tmp_path: Path) -> 
     def dying(work: Callable[[int], Any], items: Iterable[int]) -> Iterator[tuple[int, Any]]:
         yield from ((index, None) for index in items)
 
-    found = conduct(spec(tmp_path, "duration_s: {grid: [1.0, 2.0]}"), tmp_path / "out", dying)
-    entries = [(each["value"], each["run"], each["runs"], each["judged"]) for each in found["swept"][0]["entries"]]
+    result = conduct(spec(tmp_path, "duration_s: {grid: [1.0, 2.0]}"), tmp_path / "out", dying)
+    entries = [(each["value"], each["run"], each["runs"], each["judged"]) for each in result["swept"][0]["entries"]]
     assert entries == [(1.0, "", 1, 0), (2.0, "", 1, 0)]
     assert "<td>none (0 of 1 judged)</td>" in (tmp_path / "out" / PAGE).read_text()

@@ -4,6 +4,7 @@ import errno
 import json
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -139,7 +140,7 @@ def test_a_foreign_a_repeated_and_an_incomplete_part_are_refused(tmp_path: Path)
             read(path.parents[1])
     changes: list[tuple[str, Edit]] = [("index", lambda rows: rows.drop(columns="index"))]
     for name, value in (("index", None), ("ugvs", 0.9), ("ugvs", math.inf), ("margin", [1.0]), ("as_expected", "")):
-        changes.append((name, lambda rows, name=name, value=value: rows.assign(**{name: [value] * 2})))  # type: ignore[misc]
+        changes.append((name, partial(pd.DataFrame.assign, **{name: [value] * 2})))
     for column, change in changes:
         path.write_bytes(part)
         edit_part(tmp_path / "b", change)
