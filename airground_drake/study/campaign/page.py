@@ -116,15 +116,18 @@ def _cell(cell: Mapping[str, Any]) -> str:
 def _shares(cells: Sequence[Mapping[str, Any]]) -> str:
     """A bar for each combination of values: the share of runs that fail, with the counts beside it."""
     with canvas.style():
-        height_in = 0.6 + 0.22 * len(cells)
+        height_in = 1.0 + 0.22 * len(cells)
         figure = Figure(figsize=(canvas.FULL_IN, height_in))
-        axes = figure.add_axes((0.5, 0.45 / height_in, 0.4, (height_in - 0.5) / height_in))
+        axes = figure.add_axes((0.5, 0.45 / height_in, 0.4, (height_in - 0.9) / height_in))
         axes.set_xlim(0.0, 1.0)
         axes.set_ylim(-0.6, len(cells) - 0.4)
+        keys = "\n".join(canvas.short(key, 70) for key in cells[0]["where"])
+        axes.text(-0.01, 1.0, keys, transform=axes.transAxes, ha="right", va="bottom", fontsize=8.5, weight="bold")
         for k, cell in enumerate(cells):
             share = cell["refuted"] / cell["runs"]
             axes.barh(k, share, color=canvas.ALARM, height=0.6)
-            axes.text(-0.01, k, canvas.short(_cell(cell), 70), ha="right", va="center", fontsize=8.5)
+            values = canvas.short(", ".join(map(str, cell["where"].values())), 70)
+            axes.text(-0.01, k, values, ha="right", va="center", fontsize=8.5)
             axes.text(share + 0.01, k, f"{cell['refuted']} of {cell['runs']}", va="center", fontsize=8.5)
         canvas.rule(axes, "share of runs refuted", "")
         return canvas.svg(figure)
@@ -155,16 +158,17 @@ def _histogram(values: Array, title: str, label: str, mark: float | None) -> tup
         low, high = canvas.interval(values)
         span = high - low
         counts, edges = np.histogram(values, bins=BARS, range=(low - 0.01 * span, high + 0.01 * span))
-        axes.stairs(counts, edges, fill=True, color="#9db8d2", edgecolor=canvas.INK, linewidth=0.6)
+        percent = 100.0 * counts / len(values)  # a million runs would leave no room for their number
+        axes.stairs(percent, edges, fill=True, color="#9db8d2", edgecolor=canvas.INK, linewidth=0.6)
         ends = [edges[0], edges[-1], *([] if mark is None else [mark])]
         reach = 0.03 * (max(ends) - min(ends))
         axes.set_xlim(min(ends) - reach, max(ends) + reach)
-        axes.set_ylim(0.0, 1.08 * max(1, counts.max()))
+        axes.set_ylim(0.0, 1.08 * percent.max())
         if mark is not None:
             axes.axvline(mark, color=canvas.ALARM, linestyle=(0, (4, 2)), linewidth=1.2)
             above = axes.get_xaxis_transform()
             axes.text(mark, 1.0, f" {mark:g}", color=canvas.ALARM, transform=above, va="bottom", ha="center")
-        canvas.rule(axes, label, "runs")
+        canvas.rule(axes, label, "runs, %")
         return title, canvas.svg(figure)
 
 

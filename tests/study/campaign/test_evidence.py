@@ -154,7 +154,10 @@ def test_it_finds_the_keys_by_which_a_claim_fails() -> None:
         other, gain, noise = rng.random(3).tolist()
         drawn = {"other": other, "gain": gain, "noise": noise}
         by_two.append(row(i, "refuted" if gain + 0.3 * noise > 0.65 else "holds", drawn=drawn))
-    assert conclude(by_two)["claims"][0]["fails_where"]["keys"] == ["gain", "noise"]
+    (claim,) = (found := conclude(by_two))["claims"]
+    assert claim["fails_where"]["keys"] == ["gain", "noise"]
+    bars = shown(found | {"spec": "x.yaml"})
+    assert all(f">{', '.join(cell['where'].values())}</text>" in bars for cell in claim["fails_where"]["cells"])
     near = [row(i, "refuted" if i < 20 else "holds", drawn={"far": 1e6 + i / 10}) for i in range(40)]
     assert len(conclude(near)["claims"][0]["fails_where"]["cells"]) == 4
 
