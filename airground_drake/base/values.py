@@ -60,7 +60,7 @@ Share = Annotated[Number, Field(ge=SMALLEST, le=1.0), BeforeValidator(as_float)]
 Loss = Annotated[Number, wanted("a number from 0 to below 1", ge=0.0, lt=1.0), BeforeValidator(as_float)]
 Chance = Annotated[Number, Field(ge=0.0, le=1.0), BeforeValidator(as_float)]
 NotNegative = Annotated[Number, Field(ge=0.0), BeforeValidator(as_float)]
-Noise = Annotated[Number, Field(ge=0.0, le=1000.0), BeforeValidator(as_float)]  # more exceeds THR-TRIG by rounding
+Noise = Annotated[Number, Field(ge=0.0, le=1000.0), BeforeValidator(as_float)]  # rounding of more spoils verdicts
 
 
 @dataclass(frozen=True)
