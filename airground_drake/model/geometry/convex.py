@@ -402,19 +402,15 @@ def clears(row: Array, reach: float, ax: float, ay: float, bx: float, by: float)
 
 
 @njit(cache=True)
-def ways_are_clear(begin: Array, end: Array, rows: Array, reach: Array) -> Flags:
-    """Which segments, from (K, 2) to (K, 2), m, in the plane z = 0 are `reach` (m,), m, from all cores (m, W): (K,)."""
-    clear, last = np.ones(len(begin), np.bool_), 0
-    for k in range(len(begin)):
-        ax, ay, bx, by = begin[k, 0], begin[k, 1], end[k, 0], end[k, 1]
-        if len(rows) > 0 and not clears(rows[last], reach[last], ax, ay, bx, by):  # what blocked the one before
-            clear[k] = False
-            continue
-        for m in range(len(rows)):
-            if not clears(rows[m], reach[m], ax, ay, bx, by):
-                clear[k], last = False, m
-                break
-    return clear
+def blocker(ax: float, ay: float, bx: float, by: float, rows: Array, reach: Array, first: int) -> int:
+    """Which core (m, W) a segment in the plane z = 0 comes nearer to than `reach` (m,), m: one of them; -1 if none."""
+    # first: the core that is tried first, such as the one that blocked the segment before; < 0 for any.
+    if first >= 0 and not clears(rows[first], reach[first], ax, ay, bx, by):
+        return first
+    for m in range(len(rows)):
+        if not clears(rows[m], reach[m], ax, ay, bx, by):
+            return m
+    return -1
 
 
 @njit(cache=True)

@@ -19,31 +19,23 @@ from itertools import accumulate
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array, Flags, Indices, read_only
-from airground_drake.model.geometry import convex
+from airground_drake.model.geometry import convex, tangents
 from airground_drake.model.geometry.outline import BASE, CORNERS, COUNT, EXTENT, MIDDLE, TOP
 from airground_drake.model.geometry.separation import are_separated
-
-Points = NDArray[np.complex128]
+from airground_drake.model.geometry.tangents import EPS, Points
 
 # Tolerance, m. A start or goal up to TOL inside an obstacle counts as on its boundary; a disc of radius up to TOL is
 # ignored, and from walls and polygons at least twice as much is kept. It is meant for coordinates and radii up to
 # 1e4 m, where rounding (2e-12 m) stays well below.
 TOL = 1e-9
-# Room for rounding, m: legs may dip so far into an obstacle, a disc that sticks out of another by less is dropped,
-# shorter pieces are left out of the path.
-_EPS = TOL / 10
 
 FEW = 64  # up to this number of circles all obstacles enter the graph; beyond it only those that a path runs into
 
 SEARCHES = 12  # after this many searches, a quarter more obstacles enter the graph than the path runs into
-
-AT_ONCE = 1_000_000  # largest number of pairs of a segment and a disc that are tested together, to limit memory
 
 SLACK = 1e-3  # additional angle at both ends of a corner's arc that must be covered, rad
 
@@ -124,10 +116,11 @@ class PathsFrom:
         self._around = _Obstacles.of(self._flat_rows, self._reach)
 
     @cached_property
-    def _free(self) -> complex:
-        """The start, or where it leaves the obstacles."""
+    def _left(self) -> tuple[complex, "_Obstacles"]:
+        """The start, or where it leaves the obstacles; and the obstacles, with that point on their boundary at most."""
         inside = self._around.lack(self._start) is not None
-        return _escape(self._start, self._around) if inside else self._start
+        free = _escape(self._start, self._around) if inside else self._start
+        return free, self._around.shrunk(free)
 
     def to(self, goal: ArrayLike) -> Path:
         """The path to a goal, (2,), m; NoPath as for `shortest_path`."""
@@ -135,16 +128,18 @@ class PathsFrom:
         p, q = self._start, complex(*np.asarray(goal))
         if (lacking := self._around.lack(q)) is not None:
             raise NoPath(f"goal {_show(q)} is inside {lacking}")
-        around = self._around.shrunk(self._free).shrunk(q)
-        begin, end = _places(np.array([self._free, q]))
-        many = len(around.circles[1]) > FEW  # without a way the search would take long to come to an end
-        apart = many and are_separated(begin, end, self._flat_rows, self._reach - _EPS)
-        route = None if apart else _route_among(self._free, q, around)
-        if route is None:
+        free, around = self._left
+        around = around.shrunk(q)
+        route = _straight(free, q)
+        if convex.blocker(free.real, free.imag, q.real, q.imag, around.rows, around.keep - EPS, -1) >= 0:
+            many = len(around.circles[1]) > FEW  # without a way the search would take long to come to an end
+            begin, end = _places(np.array([free, q]))
+            apart = many and are_separated(begin, end, self._flat_rows, self._reach - EPS)
+            route = np.empty((0, 6)) if apart else _route_among(free, q, around)
+        if not len(route):
             raise NoPath(f"no way from start {_show(p)} to goal {_show(q)}: obstacles enclose one of them")
-        leg = np.array([self._free - p])
-        pieces = np.concatenate((_rows(np.array([p]), leg, np.zeros(1), abs(leg)), route))
-        kept = pieces[:, 5] > _EPS
+        pieces = np.concatenate((_straight(p, free), route))
+        kept = pieces[:, 5] > EPS
         return Path(pieces[kept] if kept.any() else np.array([[p.real, p.imag, 0.0, 0.0, 0.0, 0.0]]))
 
 
@@ -226,6 +221,13 @@ class _Obstacles:
         sweep = np.minimum(sweep + 2.0 * SLACK, 2.0 * np.pi)
         return ~convex.arcs_are_covered(_places(c), r, begin, sweep, self.rows, self.keep - 2.0 * TOL)
 
+    @cached_property
+    def limits(self) -> tangents.Around:
+        """What a path is made of."""
+        c, r, ways = self.circles
+        some = self.touchable
+        return tangents.Around(c[some], r[some], ways[:, some], *self.edges, self.rows, self.keep - EPS)
+
     def lack(self, point: complex) -> str | None:
         """A description of the first obstacle that is too near to a point by more than TOL; or None."""
         inside = np.flatnonzero(self.distances(point) < self.keep - TOL)
@@ -239,9 +241,7 @@ class _Obstacles:
 
     def distances(self, point: complex) -> Array:
         """Signed distances of a point from the cores, (m,), m."""
-        apart = convex.distances(self.rows, np.array((point.real, point.imag, 0.0)), True)
-        apart[: self.first] = abs(_middles(self.rows[: self.first]) - point)
-        return apart
+        return convex.distances(self.rows, np.array((point.real, point.imag, 0.0)), True)
 
     def shrunk(self, point: complex) -> Self:
         """These obstacles, shrunk so that a point up to TOL inside is on the boundary."""
@@ -254,18 +254,14 @@ class _Obstacles:
 
     def clear(self, points: Points) -> Flags:
         """Which points, (n,), are outside all obstacles; (n,)."""
-        return convex.points_are_free(_places(points), self.rows, self.keep - _EPS)
-
-    def passable(self, a: Points, b: Points) -> Flags:
-        """Which segments, from (n,) to (n,), nothing blocks; (n,)."""
-        return convex.ways_are_clear(_places(a), _places(b), self.rows, self.keep - _EPS)
+        return convex.points_are_free(_places(points), self.rows, self.keep - EPS)
 
     def entered(self, pieces: Array) -> Flags:
         """Which obstacles the pieces of a path (see ``Path``) enter, or for polygons nearly enter; (m,)."""
         discs = _entered(pieces, _middles(self.rows[: self.first]), self.keep[: self.first])
         begin, end, sagitta = _chords(pieces)
         rows, keep = self.rows[self.first :], self.keep[self.first :]
-        return np.concatenate((discs, convex.in_the_way(_places(begin), _places(end), sagitta, rows, keep - _EPS)))
+        return np.concatenate((discs, convex.in_the_way(_places(begin), _places(end), sagitta, rows, keep - EPS)))
 
 
 def _flat(rows: Array) -> Array:
@@ -308,40 +304,10 @@ def _are_outermost(c: Points, r: Array) -> Flags:
     near = cKDTree(np.column_stack([c.real, c.imag])).query_pairs(np.ptp(r) + TOL, output_type="ndarray")
     i, j = np.concatenate([near, near[:, ::-1]]).T
     apart = abs(c[i] - c[j])
-    within, around = apart + r[i] <= r[j] + _EPS, apart + r[j] <= r[i] + _EPS
+    within, around = apart + r[i] <= r[j] + EPS, apart + r[j] <= r[i] + EPS
     keep = np.ones(len(r), dtype=bool)
     keep[i[within & (~around | (j < i))]] = False
     return keep
-
-
-def _crossings(c: Points, r: Array) -> tuple[Points, Indices]:
-    """The points where two circles cross, (n,), and the indices of the two circles, (2, n)."""
-    i, j = _pairs(len(r))
-    d = abs(c[j] - c[i])
-    real = (d > abs(r[i] - r[j])) & (d <= r[i] + r[j])
-    i, j, d = i[real], j[real], d[real]
-    a = 0.5 * (d + (r[i] - r[j]) * (r[i] + r[j]) / d)
-    h = np.sqrt(np.maximum((r[i] - a) * (r[i] + a), 0.0))
-    u = (c[j] - c[i]) / d
-    return np.concatenate((c[i] + (a + 1j * h) * u, c[i] + (a - 1j * h) * u)), np.tile((i, j), 2)
-
-
-def _on_edges(c: Points, r: Array, begin: Points, end: Points) -> tuple[Points, Indices]:
-    """Where circles meet or touch segments from (k,) to (k,): the points and the indices of the circles, (n,)."""
-    points, circles = [np.empty(0, dtype=complex)], [np.empty(0, dtype=np.intp)]
-    if not len(begin):
-        return points[0], circles[0]
-    u, length = (end - begin) / abs(end - begin), abs(end - begin)
-    for some in np.array_split(np.arange(len(begin)), len(begin) * len(r) // AT_ONCE + 1):
-        z = (c[:, None] - begin[some]) * u[some].conj()  # along and beside each segment
-        half = np.sqrt(np.maximum((r[:, None] - z.imag) * (r[:, None] + z.imag), 0.0))
-        for side in (-1.0, 1.0):
-            along = z.real + side * half
-            met = (abs(z.imag) <= r[:, None] + _EPS) & (along >= -_EPS) & (along <= length[some] + _EPS)
-            i, j = np.nonzero(met)
-            points.append(begin[some][j] + along[i, j] * u[some][j])
-            circles.append(i)
-    return np.concatenate(points), np.concatenate(circles)
 
 
 def _escape(p: complex, around: _Obstacles) -> complex:
@@ -360,7 +326,7 @@ def _exit(p: complex, around: _Obstacles) -> complex:
     """The nearest point to p of the boundary of the union, tried at all places where boundaries cross."""
     c, r, _ = around.circles
     begin, end = around.edges
-    e = np.where(abs(p - c) > _EPS, p - c, 1.0)  # along +x from a centre
+    e = np.where(abs(p - c) > EPS, p - c, 1.0)  # along +x from a centre
     u, length = (end - begin) / abs(end - begin), abs(end - begin)
     feet = begin + np.clip(((p - begin) * u.conj()).real, 0.0, length) * u
     i, j = _pairs(len(begin))
@@ -368,14 +334,10 @@ def _exit(p: complex, around: _Obstacles) -> complex:
         share = ((begin[j] - begin[i]) * u[j].conj()).imag / (u[i] * u[j].conj()).imag
     met = (share >= 0.0) & (share <= length[i])
     candidates = np.concatenate((
-        (c + r / abs(e) * e)[abs(p - c) < r], _crossings(c, r)[0],
-        feet, _on_edges(c, r, begin, end)[0], begin[i[met]] + share[met] * u[i[met]],
+        (c + r / abs(e) * e)[abs(p - c) < r], np.array(tangents.meetings(c, r, begin, end)[0], dtype=complex),
+        feet, begin[i[met]] + share[met] * u[i[met]],
     ))  # fmt: skip
     return complex(min(candidates[around.clear(candidates)], key=lambda z: float(abs(z - p))))
-
-
-_SIDES = np.array([[1.0], [1.0], [-1.0], [-1.0]])  # 1 outer tangent, -1 inner
-_TURNS = np.array([1.0, -1.0, 1.0, -1.0])
 
 
 @lru_cache(maxsize=16)
@@ -385,42 +347,22 @@ def _pairs(count: int) -> tuple[Indices, Indices]:
     return i, j
 
 
-def _tangents(c: Points, r: Array, ways: Points) -> tuple[Points, Points, Indices]:
-    """Both ends of all common tangents, (n,), and the circles they touch, (2, n); 0, 1 are points."""
-    # A tangent that cuts the polygon about whose corner the circle is, is left out: the ways to the next corners,
-    # (2, m), lead to its other side.
-    i, j = _pairs(len(r))
-    apart = abs(c[j] - c[i])
-    k = r[i] - _SIDES * r[j]
-    real = (apart >= abs(k) - _EPS) & (apart > 0.0)
-    real[2:] &= i > 1  # a point has two tangents to a circle, not four
-    which, pair = np.nonzero(real)
-    f, g, d, k, side, turn = i[pair], j[pair], apart[pair], k[real], _SIDES[which, 0], _TURNS[which]
-    u = (c[g] - c[f]) / d
-    d = np.where(d - abs(k) <= _EPS, abs(k), d)  # touching
-    normal = (k + 1j * turn * np.sqrt((d - k) * (d + k))) / d * u
-    if ways.any():
-        inside = (normal * ways[:, f].conj()).real > _EPS, (side * normal * ways[:, g].conj()).real > _EPS
-        out = ~(inside[0] | inside[1]).any(axis=0)
-        f, g, normal, side = f[out], g[out], normal[out], side[out]
-    return c[f] + r[f] * normal, c[g] + side * r[g] * normal, np.array((f, g))
+def _straight(begin: complex, end: complex) -> Array:
+    """The straight piece (see ``Path``) between two points, (1, 6)."""
+    way = end - begin
+    unit = way / max(abs(way), 1e-300)
+    return np.array([[begin.real, begin.imag, unit.real, unit.imag, 0.0, abs(way)]])
 
 
-def _rows(begin: Points, heading: Points, curvature: Array, length: Array) -> Array:
-    """Rows of ``Path.pieces``; the headings may have any length, also zero."""
-    unit = heading / np.maximum(abs(heading), 1e-300)
-    return np.stack((begin.real, begin.imag, unit.real, unit.imag, curvature, length), axis=1)
-
-
-def _route_among(p: complex, q: complex, around: _Obstacles) -> Array | None:
+def _route_among(p: complex, q: complex, around: _Obstacles) -> Array:
     """The pieces of the shortest path: one among some obstacles is shortest if it enters none of the others."""
     if len(around.circles[1]) <= FEW:
-        return _route(p, q, around)
-    some = around.entered(_rows(np.array([p]), np.array([q - p]), np.zeros(1), np.array([abs(q - p)])))
+        return tangents.shortest(p, q, around.limits)
+    some = around.entered(_straight(p, q))
     searches = 0
     while True:
-        route = _route(p, q, around.some(some))
-        new = np.zeros_like(some) if route is None else around.entered(route) & ~some
+        route = tangents.shortest(p, q, around.some(some).limits)
+        new = around.entered(route) & ~some
         if not new.any():
             return route
         some, searches = some | new, searches + 1
@@ -445,58 +387,4 @@ def _entered(pieces: Array, c: Points, r: Array) -> Flags:
     turn = np.where(turned <= sweep, turned, np.where(turned - sweep < 2.0 * np.pi - turned, sweep, 0.0))
     on_arc = hub + (begin - hub) * np.exp(1j * np.sign(curvature) * turn)
     nearest = np.where(bent, on_arc, begin + along * heading)
-    return np.asarray((abs(nearest - c) < r - _EPS).any(axis=0))
-
-
-def _route(p: complex, q: complex, around: _Obstacles) -> Array | None:
-    """The pieces (see ``Path``) of the shortest path between free points; None if no path exists."""
-    if abs(q - p) <= _EPS:
-        return np.empty((0, 6))
-    c, r, ways = around.circles
-    some = around.touchable
-    c, r, ways = c[some], r[some], ways[:, some]
-    a, b, on = _tangents(
-        np.concatenate(([p, q], c)), np.concatenate(([0.0, 0.0], r)), np.concatenate((np.zeros((2, 2)), ways), axis=1)
-    )
-    free = around.passable(a, b)
-    a, b, on = a[free], b[free], on[:, free] - 2  # on -2, -1: start and goal, which are the nodes 0 and 1
-    cross, pair = _crossings(c, r)
-    met, by = _on_edges(c, r, *around.edges)
-    at = np.concatenate(([p, q], a, b, cross, met))
-    n, k = len(at), len(a)
-    ends = np.where(on < 0, on + 2, 2 + np.arange(2 * k).reshape(2, k))
-    crossed = np.arange(2 + 2 * k, n - len(met))
-
-    # Arcs between neighbouring nodes of a circle: free or blocked as a whole, as its crossings with all other
-    # boundaries are nodes too.
-    node = np.concatenate((ends.ravel(), crossed, crossed, np.arange(n - len(met), n)))
-    disc = np.concatenate((on.ravel(), pair.ravel(), by))
-    node, disc = node[disc >= 0], disc[disc >= 0]
-    angle = np.angle(at[node] - c[disc])
-    order = np.lexsort((angle, disc))
-    node, disc, angle = node[order], disc[order], angle[order]
-    last = np.arange(1, len(node) + 1) == np.searchsorted(disc, disc, side="right")
-    after = np.where(last, np.searchsorted(disc, disc), np.arange(1, len(node) + 1))
-    sweep = angle[after] - angle + np.where(last, 2.0 * np.pi, 0.0)
-    free = around.clear(c[disc] + r[disc] * np.exp(1j * (angle + 0.5 * sweep)))
-    node, after, disc, sweep = node[free], node[after][free], disc[free], sweep[free]
-
-    # Every edge in both directions; of parallel edges the shortest, as a sparse matrix would add them up.
-    tail = np.concatenate((ends[0], ends[1], node, after))
-    head = np.concatenate((ends[1], ends[0], after, node))
-    bend = np.concatenate((np.zeros(2 * k), 1.0 / r[disc], -1.0 / r[disc]))
-    heading = np.concatenate((b - a, a - b, 1j * (at[node] - c[disc]), 1j * (c[disc] - at[after])))
-    length = np.concatenate((np.tile(abs(b - a), 2), np.tile(r[disc] * sweep, 2)))
-    order = np.argsort(length, kind="stable")
-    key, first = np.unique((tail * n + head)[order], return_index=True)
-    edge = order[first]
-    begins = np.searchsorted(tail[edge], np.arange(n + 1))
-    graph = csr_array((length[edge], head[edge].astype(np.int32), begins.astype(np.int32)), shape=(n, n))
-    before = dijkstra(graph, indices=0, return_predecessors=True)[1]
-    if before[1] < 0:
-        return None
-    chain = [1]
-    while chain[0] != 0:
-        chain.insert(0, int(before[chain[0]]))
-    edge = edge[np.searchsorted(key, np.array(chain[:-1]) * n + chain[1:])]
-    return _rows(at[tail[edge]], heading[edge], bend[edge], length[edge])
+    return np.asarray((abs(nearest - c) < r - EPS).any(axis=0))

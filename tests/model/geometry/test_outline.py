@@ -203,7 +203,11 @@ FREE: dict[str, Clear] = {
         all(convex.clears(row, far, *a, *b) for row, far in zip(rows, keep.tolist(), strict=True))
         for a, b in zip(begin, end, strict=True)
     ]),
-    "all at once": convex.ways_are_clear,
+    **{
+        f"no blocker, first tried {first}": lambda begin, end, rows, keep, first=first: np.array([
+            convex.blocker(*a, *b, rows, keep, first) < 0 for a, b in zip(begin, end, strict=True)
+        ]) for first in (-1, 0, 3)
+    },
     "what is in the way": lambda begin, end, rows, keep: np.array([
         not convex.in_the_way(a[None], b[None], np.zeros(1), rows, keep).any() for a, b in zip(begin, end, strict=True)
     ]),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from properties import examples
 
 from airground_drake.base.arrays import Array
-from airground_drake.model.geometry import paths
+from airground_drake.model.geometry import paths, tangents
 from airground_drake.model.geometry.outline import balls
 from airground_drake.model.geometry.paths import TOL, NoPath, Path, shortest_path
 
@@ -167,8 +167,8 @@ def test_start_inside_discs(angle: float, depth: float, goal: Point, discs: list
 def test_a_way_along_a_wall_of_many_parts_takes_few_searches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Round one disc the next is in the way, and so on to the end of the wall."""
     discs = [(0.4 * k, 0.4 * k, 0.3) for k in range(-80, 81)]
-    searches, search = list[int](), paths._route
-    monkeypatch.setattr(paths, "_route", lambda p, q, some: searches.append(len(some.keep)) or search(p, q, some))
+    searches, search = list[int](), tangents.shortest
+    monkeypatch.setattr(tangents, "shortest", lambda p, q, some: searches.append(len(some.reach)) or search(p, q, some))
     found = find((2.0, -2.0), (-2.0, 2.0), discs)
     assert clearance(sample(found)[1], discs) >= -TOL
     assert len(searches) < 30
