@@ -77,7 +77,7 @@ def nodes_near(grid: Grid, column: int, low: float, high: float) -> Indices:
 @njit(cache=True)
 def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Array]:
     """When a timed motion is nearer to nodes than their radii; `motion` (M, 3); `radii` (N,), m."""
-    # Returns nodes (B,) and begin and end of each blocked time, (B, 2), s.
+    # Returns nodes (B,), sorted, and begin and end of each blocked time, (B, 2), s; those of a node do not overlap.
     nodes, times, count = np.empty(1024, np.int64), np.empty((1024, 2)), 0
     reach = radii.max()
     for k in range(len(motion)):
@@ -96,7 +96,22 @@ def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Arr
                     nodes, times = np.append(nodes, nodes), np.concatenate((times, times))
                 nodes[count], times[count, 0], times[count, 1] = n, begin + entry, begin + leave
                 count += 1
-    return nodes[:count], times[:count]
+    return _without_overlaps(len(radii), nodes[:count], times[:count])
+
+
+@njit(cache=True)
+def _without_overlaps(count: int, nodes: Indices, times: Array) -> tuple[Indices, Array]:
+    """Blocked times, sorted by node, of which those that overlap or touch are one."""
+    first, by_node = times_by_node(count, nodes, times)
+    total = 0
+    for n in range(count):
+        for k in range(first[n], first[n + 1]):
+            if k > first[n] and by_node[k, 0] <= times[total - 1, 1]:
+                times[total - 1, 1] = max(times[total - 1, 1], by_node[k, 1])
+                continue
+            nodes[total], times[total, 0], times[total, 1] = n, by_node[k, 0], by_node[k, 1]
+            total += 1
+    return nodes[:total].copy(), times[:total].copy()
 
 
 @njit(cache=True)
@@ -153,13 +168,13 @@ def join_time(arrival: float, end: float, first: float, last: float) -> float:
 
 @njit(cache=True)
 def search(
-    edges: Edges, intervals: Intervals, start: int, joins: Array, to_go: Array, budget: int
+    edges: Edges, intervals: Intervals, start: int, joins: Array, to_go: Array, budget: int, latest: float
 ) -> tuple[Indices, Array, float, int]:
-    """Safe-interval search (A*): the way from a node to the earliest join; `to_go` (N,), s."""
+    """Safe-interval search (A*): the way from a node to the earliest join before `latest`, s; `to_go` (N,), s."""
     # The robot may wait at a node during a safe interval of the node. It travels an edge only while both ends are safe.
     # joins: first and last time at which the preset can be joined at each node, (N, 2), s; see `join_time`.
     # Returns nodes (L,) in order, arrival at each (L,), s, time of the join, s, and number of expanded intervals. If no
-    # join is found, L = 0 and its time is infinite.
+    # join is found, L = 0 and its time is `latest`.
     first, times = intervals
     arrival, before = np.full(len(times), np.inf), np.full(len(times), -1, np.int64)
     closed, node_of = np.zeros(len(times), np.bool_), np.empty(len(times), np.int64)
@@ -170,7 +185,7 @@ def search(
     if first[start] < first[start + 1] and times[first[start], 0] == 0.0 and to_go[start] < np.inf:
         arrival[first[start]] = 0.0
         heappush(heap, (to_go[start], int(first[start])))
-    best, last, expanded = np.inf, -1, 0
+    best, last, expanded = latest, -1, 0
     while len(heap) > 0 and expanded < budget:
         bound, i = heappop(heap)
         if bound >= best:

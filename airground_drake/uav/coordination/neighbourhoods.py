@@ -83,7 +83,9 @@ class Refinement:
         taken = [*self._fixed, *(self._body(j, self.ways[j]) for j in range(len(changed)) if j not in group)]
         gain = sum(self._late(i) for i in group)  # largest possible one
         for i in group:
-            way, spent = find(self._movers[i], taken, self._follow, max(0, expansions - self.expansions))
+            latest = self._alone[i].joined + gain - GAIN_S
+            budget = max(0, expansions - self.expansions)
+            way, spent = find(self._movers[i], taken, self._follow, budget, latest=latest)
             self.searches += 1
             self.expansions += spent
             if way is None:

@@ -151,9 +151,8 @@ def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: S
             partner[ends] = ends[::-1]
     grid = _grid(points, low, reach)
     pairs = _pairs(grid, number, radii, partner, shut)
-    pairs = pairs[space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])]
-    first, heads, lengths = _in_rows(points, pairs)
-    return Roadmap(grid, first, heads, lengths, reach, tuple(robots))
+    free = space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])
+    return Roadmap(grid, *_in_rows(points, pairs, free), reach, tuple(robots))
 
 
 def _lattice(space: Space, low: Array, high: Array, pitch: float) -> tuple[Array, Indices]:
@@ -293,14 +292,31 @@ def _fan(space: Space, start: Array, far: float) -> Array:
     return np.asarray(places[space.points_are_free(places, CHORDS * space.clearance)])
 
 
-def _in_rows(points: Array, pairs: Indices) -> tuple[Indices, Indices, Array]:
-    """Edges in both directions, sorted by tail and head: first edge of each node, heads, lengths."""
-    one, other = pairs.T
-    lengths = np.maximum(np.sqrt(np.square(points[other] - points[one]).sum(axis=1)), ROUNDING_M)
-    ends = np.append(one, other), np.append(other, one)
-    graph = csr_array((np.tile(lengths, 2), ends), shape=(len(points),) * 2)
-    graph.sort_indices()
-    return graph.indptr.astype(np.int64), graph.indices.astype(np.int64), graph.data
+@njit(cache=True)
+def _in_rows(points: Array, pairs: Indices, free: npt.NDArray[np.bool_]) -> tuple[Indices, Indices, Array]:
+    """The free edges in both directions, sorted by tail and head: first edge of each node, heads, lengths."""
+    first = np.zeros(len(points) + 1, np.int64)
+    for k in range(len(pairs)):
+        if free[k]:
+            first[pairs[k, 0] + 1] += 1
+            first[pairs[k, 1] + 1] += 1
+    for n in range(len(points)):
+        first[n + 1] += first[n]
+    by_tail, heads, lengths = np.empty(first[-1], np.int64), np.empty(first[-1], np.int64), np.empty(first[-1])
+    end = first[:-1].copy()
+    for k in range(len(pairs)):
+        if free[k]:
+            one, other = pairs[k]
+            by_tail[end[one]], by_tail[end[other]] = other, one
+            end[one] += 1
+            end[other] += 1
+    end = first[:-1].copy()
+    for tail in range(len(points)):  # in this order, the heads of each node are sorted: every edge has both directions
+        for node in by_tail[first[tail] : first[tail + 1]]:
+            dx, dy = points[node, 0] - points[tail, 0], points[node, 1] - points[tail, 1]
+            heads[end[node]], lengths[end[node]] = tail, max(np.sqrt(dx * dx + dy * dy), ROUNDING_M)
+            end[node] += 1
+    return first, heads, lengths
 
 
 def _grid(points: Array, low: Array, size: float) -> Grid:

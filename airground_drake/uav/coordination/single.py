@@ -53,8 +53,8 @@ class Mover:
     to_go: Array  # lower bound of the time from every node to its preset, (N,), s
     clear: Flags  # which pieces of its preset between neighbouring nodes are free of discs, (K - 1,)
     edges: intervals.Edges
-    # What other robots block, by the identity of a motion and a radius, and the motion, which keeps it alive.
-    blocked: dict[tuple[int, float], tuple[Indices, Array, Array]] = field(default_factory=dict)
+    blocked: dict[tuple[int, float], "Blocked"] = field(default_factory=dict)  # by others' `id(motion)`s and radii
+    found: dict[object, "Found"] = field(default_factory=dict)  # earlier results of `find`
 
     @classmethod
     def on(cls, roadmap: Roadmap, space: Space, task: RobotTask, speed: float, own: RobotNodes) -> Self:
@@ -66,10 +66,53 @@ class Mover:
         return cls(task, speed, own, roadmap, space, to_go, clear, edges)
 
 
+class Blocked(NamedTuple):
+    """What the motion of another robot blocks for a mover."""
+
+    nodes: Indices  # (B,)
+    times: Array  # when they are blocked, (B, 2), s
+    clear: Flags  # which pieces of the preset it leaves free, (K - 1,)
+    at_end: bool  # whether the mover can stay at the end of its preset
+    motion: Array  # kept alive, for it is known by its identity
+
+
+class Found(NamedTuple):
+    """A result of `find`."""
+
+    way: Way | None
+    spent: int  # number of expanded intervals
+    latest: float  # up to when the robot had to be back, s
+    others: tuple[OtherRobot, ...]  # which keeps their motions alive: they are known by their identity
+
+
 def find(
-    mover: Mover, fixed: Sequence[OtherRobot], follow: float, budget: int, brief: Sequence[OtherRobot] = ()
+    mover: Mover,
+    fixed: Sequence[OtherRobot],
+    follow: float,
+    budget: int,
+    brief: Sequence[OtherRobot] = (),
+    latest: float = math.inf,
 ) -> tuple[Way | None, int]:
-    """Find the way on which a robot is back on its preset as early as possible."""
+    """Find the way on which a robot is back on its preset as early as possible, before the time `latest`, s."""
+    # A robot is planned for among the same others several times: then the earlier result is returned, with its effort.
+    others = (*fixed, *brief)
+    key = frozenset((id(other.motion), other.radius, other.until) for other in others), follow
+    known = mover.found.get(key)
+    if known is None or known.spent > budget or (known.way is None and known.latest < latest):
+        known = Found(*_found(mover, fixed, follow, budget, others, latest), latest, others)
+        if known.spent < budget:
+            mover.found[key] = known
+    return known.way, known.spent
+
+
+def _found(
+    mover: Mover,
+    fixed: Sequence[OtherRobot],
+    follow: float,
+    budget: int,
+    others: Sequence[OtherRobot],
+    latest: float,
+) -> tuple[Way | None, int]:
     # The robot is back when it has joined its preset and nothing blocks it for the time `follow`, or to its end.
     #
     # Why robots keep their distance d + spacing also along an edge: let R^2 = (d + spacing)^2 + L^2/4, where L is the
@@ -81,54 +124,50 @@ def find(
     # follow: how long the preset must be free, s.
     # Returns the way, or None if no way is found within the budget; and the number of expanded intervals.
     own, roadmap = mover.own, mover.roadmap
-    blocked = [_blocked_times(mover, other) for other in [*fixed, *brief]]
+    blocked = [_blocked(mover, other) for other in others]
     while len(mover.blocked) > max(MOST_KNOWN, len(blocked)):
         del mover.blocked[next(iter(mover.blocked))]  # the one not used for longest
-    nodes = np.concatenate([np.zeros(0, np.int64), *(nodes for nodes, _ in blocked)])
-    times = np.concatenate([np.zeros((0, 2)), *(times for _, times in blocked)])
-    free = intervals.safe_intervals(len(roadmap.nodes), nodes, times)
-    joins = _joins(mover, fixed, follow)
-    route, arrivals, joined, spent = intervals.search(mover.edges, free, own.start, joins, mover.to_go, budget)
+    nodes = np.concatenate([np.zeros(0, np.int64), *(by.nodes for by in blocked)])
+    until = [np.minimum(by.times, other.until) for by, other in zip(blocked, others, strict=True)]
+    free = intervals.safe_intervals(len(roadmap.nodes), nodes, np.concatenate([np.zeros((0, 2)), *until]))
+    joins = _joins(mover, blocked[: len(fixed)], follow)
+    route, arrivals, joined, spent = intervals.search(mover.edges, free, own.start, joins, mover.to_go, budget, latest)
     return (_way(roadmap, mover, route, arrivals, joined) if len(route) else None), int(spent)
 
 
-def _blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
-    """Nodes (B,) that another robot blocks, and when, (B, 2), s. Start and target have smaller radii, see `find`."""
+def _blocked(mover: Mover, other: OtherRobot) -> Blocked:
+    """What another robot blocks; as long as it counts as an obstacle."""
     key = id(other.motion), other.radius
-    known = mover.blocked.pop(key, None) or (*_all_blocked_times(mover, other), other.motion)
+    known = mover.blocked.pop(key, None) or _blocked_by(mover, other)
     mover.blocked[key] = known
-    return known[0], np.minimum(known[1], other.until)
+    return known
 
 
-def _all_blocked_times(mover: Mover, other: OtherRobot) -> tuple[Indices, Array]:
-    roadmap, space = mover.roadmap, mover.space
-    start, target = roadmap.nodes[mover.own.start], roadmap.nodes[mover.own.target]
+def _blocked_by(mover: Mover, other: OtherRobot) -> Blocked:
+    own, roadmap, space = mover.own, mover.roadmap, mover.space
+    start, target = roadmap.nodes[own.start], roadmap.nodes[own.target]
     at_first = float(np.hypot(*(start - other.motion[0, 1:])))
     at_last = float(np.hypot(*(target - other.motion[-1, 1:])))
     near = np.minimum([at_first, at_last], space.apart + other.radius) - ROUNDING_M
     radii = np.full(len(roadmap.nodes), space.wide(roadmap.longest, other.radius))
-    np.minimum.at(radii, [mover.own.start, mover.own.target], near)
-    return intervals.blocked_times(other.motion, roadmap.grid, radii)
+    np.minimum.at(radii, [own.start, own.target], near)
+    preset = timed(own.preset_times, roadmap.nodes[own.preset])
+    wished = _wished(space, other)
+    clear = free_pieces(preset, other.motion, wished - ROUNDING_M)
+    at_end = distance(preset[-1:], other.motion, float(preset[-1, 0])) >= min(wished, at_last) - ROUNDING_M
+    return Blocked(*intervals.blocked_times(other.motion, roadmap.grid, radii), clear, at_end, other.motion)
 
 
-def _joins(mover: Mover, fixed: Sequence[OtherRobot], follow: float) -> Array:
+def _joins(mover: Mover, blocked: Sequence[Blocked], follow: float) -> Array:
     """First and last time at which the preset can be joined at each node, (N, 2), s; see `intervals.join_time`."""
-    own, roadmap, space = mover.own, mover.roadmap, mover.space
-    times, places = own.preset_times, roadmap.nodes[own.preset]
-    preset, clear = timed(times, places), mover.clear.copy()
-    for other in fixed:
-        clear &= free_pieces(preset, other.motion, _wished(space, other) - ROUNDING_M)
-    stays = preset[-1:]
-    in_the_end = np.array([np.hypot(*(places[-1] - other.motion[-1, 1:])) for other in fixed])
-    held = all(
-        distance(stays, other.motion, float(times[-1])) >= min(_wished(space, other), end) - ROUNDING_M
-        for other, end in zip(fixed, in_the_end.tolist(), strict=True)
-    )
+    own, roadmap, times = mover.own, mover.roadmap, mover.own.preset_times
+    clear = np.logical_and.reduce([mover.clear, *(by.clear for by in blocked)])
+    held = all(by.at_end for by in blocked)
     # the next time at which the preset is blocked, for each of its nodes
-    blocked = np.append(np.where(clear, np.inf, times[:-1]), np.inf if held else times[-1])
-    blocked = np.minimum.accumulate(blocked[::-1])[::-1]
+    until = np.append(np.where(clear, np.inf, times[:-1]), np.inf if held else times[-1])
+    until = np.minimum.accumulate(until[::-1])[::-1]
     joins = np.tile([np.inf, -np.inf], (len(roadmap.nodes), 1))
-    usable = own.usable & (blocked >= np.minimum(times + follow, times[-1]))
+    usable = own.usable & (until >= np.minimum(times + follow, times[-1]))
     joins[own.preset[usable]] = times[usable, None]
     joins[own.target] = times[-1], np.inf
     return joins

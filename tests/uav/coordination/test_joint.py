@@ -18,7 +18,7 @@ from airground_drake.model.geometry import outline
 from airground_drake.uav.coordination import intervals
 from airground_drake.uav.coordination.joint import Effort, Plan, plan
 from airground_drake.uav.coordination.roadmap import RobotTask, Space, build_roadmap
-from airground_drake.uav.coordination.single import OtherRobot, _wished, sum_of_times
+from airground_drake.uav.coordination.single import Mover, OtherRobot, _wished, find, sum_of_times
 from airground_drake.uav.coordination.timed import free_pieces
 
 CORRIDOR = [(x, y) for x in np.arange(-6.0, 6.1, 1.5) for y in (-2.3, 2.3)]
@@ -172,6 +172,31 @@ def test_what_a_robot_that_stands_blocks_is_computed_once(monkeypatch: pytest.Mo
     found = plan(space(cage), tasks, [1.0] * 3, parked)
     assert [way is None for way in found.ways] == [True, False, False]
     assert max(computed.values()) == 1
+
+
+@given(seed=st.integers(0, 10**6), count=st.integers(1, 4), limits=st.lists(st.floats(-3.0, 3.0), max_size=3))
+@examples(20)
+def test_a_way_is_found_if_the_robot_can_be_back_in_time(seed: int, count: int, limits: list[float]) -> None:
+    """Whatever was asked before; found again among the same others, it is the same way, with the same effort."""
+    room, tasks = random_team(seed, count + 1, 2, 14.0)
+    roadmap = build_roadmap([room] * len(tasks), tasks)
+    movers = [Mover.on(roadmap, room, one, 1.0, own) for one, own in zip(tasks, roadmap.robots, strict=True)]
+    others = [OtherRobot(way.motion) for mover in movers[1:] if (way := find(mover, [], 5.0, 10**6)[0])]
+    fresh = Mover.on(roadmap, room, tasks[0], 1.0, roadmap.robots[0])
+    best, spent = find(fresh, others, 5.0, 10**6)
+    earliest = math.inf if best is None else best.joined
+    for limit in [*limits, -1e-6, 1e-6]:
+        way, effort = find(movers[0], others, 5.0, 10**6, latest=earliest + limit)
+        assert way is not None or best is None or limit <= 0.0
+        assert way is None or way.joined == earliest
+        assert effort <= spent
+    again, effort = find(movers[0], others[::-1], 5.0, 10**6)
+    assert effort == spent
+    assert (again is None) == (best is None)
+    if best is not None and again is not None:
+        assert np.array_equal(again.motion, best.motion)
+    if spent > 0:
+        assert find(movers[0], others, 5.0, spent - 1)[1] <= spent - 1
 
 
 def test_the_preset_is_joined_where_it_is_free_again() -> None:
