@@ -69,7 +69,7 @@ class PlannerState(Immutable):
     def faults(self) -> list[Asked]:
         return [asked for asked in self.asked if asked.what]
 
-    @property
+    @cached_property
     def proposals(self) -> Proposals:
         """The proposals in force, one entry per UGV."""
         return tuple(talk.proposal for talk in self.talks)

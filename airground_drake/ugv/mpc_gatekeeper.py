@@ -90,6 +90,7 @@ class Gatekeepers(abc.ABC):
         self._presets = tuple(presets)
         self._world = world
         self._near = world.around(world.select("ugv"))
+        self._slept: tuple[Proposals | None, GatekeeperState | None, float] = None, None, 0.0
 
     @property
     def judges(self) -> str:
@@ -128,7 +129,9 @@ class Gatekeepers(abc.ABC):
         self, t: float, proposals: Proposals, positions: Array, before: GatekeeperState
     ) -> GatekeeperState | None:
         """The state after a sample at t, s, that only repeats the answers; None if the sample must be computed."""
-        if t >= self.asleep_until(proposals, before) or self.wakes(t, positions, before):
+        if proposals is not self._slept[0] or before is not self._slept[1]:  # otherwise it is as late as before
+            self._slept = proposals, before, self.asleep_until(proposals, before)
+        if t >= self._slept[2] or self.wakes(t, positions, before):
             return None
         return self.kept([t], proposals, before)
 

@@ -1,6 +1,7 @@
 """The UAVs' planners: proposals for the UGVs that the trigger has flagged."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
@@ -73,6 +74,7 @@ class InterventionPlanner(LeafSystem):
         # Drake empties this slot of the Context when time, state or an input changes
         needs = {self.all_sources_ticket()}
         self._ahead = declare_cached(self, "planned ahead", _Ahead(), lambda *_: _Ahead(), needs)
+        self._slept: tuple[PlannerState | None, tuple[Any, ...], float] = None, (), 0.0
         self._ticks = Ticks(planner.period, control_period)
         self._room = room(planner.max_speed)
         self.DeclareDiscreteState(np.tile([0.0, 0.0, 0.0, NOT_WATCHED], n))
@@ -127,6 +129,12 @@ class InterventionPlanner(LeafSystem):
         answers, reports = answers_heard(self._heard.Eval(context), range(len(self._planner.ugvs)))
         return np.array(answers), reports
 
+    def _asleep_until(self, memory: PlannerState, *given: Any) -> float:
+        """`Planner.asleep_until`, computed when an argument changes."""
+        if memory is not self._slept[0] or given != self._slept[1]:
+            self._slept = memory, given, self._planner.asleep_until(memory, *given)
+        return self._slept[2]
+
     def _planned(self, context: Context) -> PlannerState | None:
         """The memory after planning at the context's time; None at other times, or if nothing changes."""
         t = context.get_time()
@@ -137,7 +145,7 @@ class InterventionPlanner(LeafSystem):
             return self._planner.lost(before, t)
         intervening = [mode == INTERVENING for mode in self._status.Eval(context)[::FIELDS].tolist()]
         answers, reports = self._answered(context)
-        if t < self._planner.asleep_until(before, intervening, None if self._channel else answers, reports):
+        if t < self._asleep_until(before, intervening, None if self._channel else answers.tolist(), reports):
             return None
         bodies = self._bodies.Eval(context).reshape(-1, 3)
         stands = standing(self._halts(context), t).tolist()  # of this instant: the state is updated after this
