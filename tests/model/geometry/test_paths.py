@@ -164,6 +164,17 @@ def test_start_inside_discs(angle: float, depth: float, goal: Point, discs: list
     assert path.length_m >= leg + math.dist(leave.tolist(), goal) - 1e-9
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_small_disc_on_the_rim_of_a_large_one_is_not_run_through(order: int) -> None:
+    """It is not in the middle of the arc between the neighbouring tangents."""
+    rim, leave = (2.0 * np.exp(1j * math.radians(angle)) for angle in (75.0, 70.0))
+    goal = leave * (1.0 - 1.0j)
+    discs = [(rim.real, rim.imag, 0.1), (0.0, 0.0, 2.0)][::order]
+    path = find((-4.0, 0.0), (goal.real, goal.imag), discs)
+    assert clearance(sample(path, 1000)[1], discs) >= -TOL
+    check_curve(path, (-4.0, 0.0), (goal.real, goal.imag))
+
+
 def test_a_way_along_a_wall_of_many_parts_takes_few_searches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Round one disc the next is in the way, and so on to the end of the wall."""
     discs = [(0.4 * k, 0.4 * k, 0.3) for k in range(-80, 81)]
