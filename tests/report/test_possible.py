@@ -165,6 +165,18 @@ def test_decisions_go_on_until_the_uav_withdraws_a_motion_that_has_run_out(
     assert [*impossible(honest, honest.scenario)] == []
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("dwell_s", [0.0, 0.2])
+def test_an_answer_to_a_proposal_stands_as_long_as_declared(dwell_s: float) -> None:
+    """Two UGVs answer the same proposal twice; for one of them, the first answer stands for less than 0.2 s."""
+    honest = simulate(load("crossing", [f"gatekeeper.min_dwell_s={dwell_s}", "duration_s=10.9"]), "c", engine="batch")
+    assert [*impossible(honest, honest.scenario)] == []
+    other = load("crossing", [f"gatekeeper.min_dwell_s={0.2 - dwell_s}", "duration_s=10.9"])
+    said = [line["about"] for line in impossible(honest, other)]
+    assert said
+    assert {about.split(" of ")[0] for about in said} == {"answer"}
+
+
 def test_without_a_channel_answers_are_those_of_decisions_and_a_lost_uav_is_silent() -> None:
     honest = simulate(load("two_uavs", {"duration_s": 12.0}), "d")
     assert [*impossible(honest, honest.scenario)] == []
