@@ -6,6 +6,7 @@ between neighbouring nodes of a circle is free or blocked as a whole. Points are
 """
 
 import math
+from cmath import phase
 from heapq import heappop, heappush
 from typing import NamedTuple
 
@@ -46,9 +47,9 @@ def shortest(p: complex, q: complex, around: Around) -> Array:
     _join_tangents(around, at, marks, edges)
     points, circles = meetings(around.c, around.r, around.begin, around.end)
     for point, (i, j) in zip(points, circles):  # noqa: B905
-        heappush(marks, (i, _direction(point - around.c[i]), len(at)))
+        heappush(marks, (i, phase(point - around.c[i]), len(at)))
         if j >= 0:
-            heappush(marks, (j, _direction(point - around.c[j]), len(at)))
+            heappush(marks, (j, phase(point - around.c[j]), len(at)))
         at.append(point)
     _join_arcs(around, marks, edges)
     last = _searched(len(at), edges)
@@ -67,11 +68,6 @@ def shortest(p: complex, q: complex, around: Around) -> Array:
             pieces[k, column] = row[column]
         node = tail
     return pieces
-
-
-@njit(cache=True)
-def _direction(z: complex) -> float:
-    return math.atan2(z.imag, z.real)
 
 
 @njit(cache=True)
@@ -119,7 +115,7 @@ def _added(point: complex, circle: int, c: Points, at: list[complex], marks: lis
     """The node of a tangent's end; `circle` counts start and goal, which are nodes already."""
     if circle < 2:
         return circle
-    heappush(marks, (circle - 2, _direction(point - c[circle]), len(at)))
+    heappush(marks, (circle - 2, phase(point - c[circle]), len(at)))
     at.append(point)
     return len(at) - 1
 
