@@ -56,7 +56,7 @@ class Detour(Policy):
         duration, path = met
 
         count = max(1, math.ceil(duration / SAMPLE_S))
-        legs = np.array([path.at(path.length_m * k / count)[0] for k in range(count + 1)])
+        legs = path.points(path.length_m * k / count for k in range(count + 1))
         times = seen.start + np.linspace(0.0, max(duration, RENDEZVOUS_TOLERANCE_S), count + 1)
         return _then_follow(times, legs, seen.preset, self.follow, height)
 

@@ -13,6 +13,7 @@ number x + iy.
 
 import math
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from itertools import accumulate
@@ -68,16 +69,24 @@ class Path:
 
     def at(self, s: float) -> tuple[Array, Array]:
         """Point, (2,), m, and unit tangent in the direction of travel, (2,), at an arc length, m, which is clipped."""
+        x, y, tx, ty = self._at(s)
+        return np.array((x, y)), np.array((tx, ty))
+
+    def points(self, lengths: Iterable[float]) -> Array:
+        """Points at arc lengths, m, as `at`; (n, 2), m."""
+        return np.array([self._at(s)[:2] for s in lengths]).reshape(-1, 2)
+
+    def _at(self, s: float) -> tuple[float, float, float, float]:
         s = min(max(s, 0.0), self.length_m)
         k = bisect_right(self._begins, s) - 1
         x, y, tx, ty, curvature, _ = self._rows[k]
         u = s - self._begins[k]
         if curvature == 0.0:
-            return np.array((x + u * tx, y + u * ty)), np.array((tx, ty))
+            return x + u * tx, y + u * ty, tx, ty
         sin, cos = math.sin(0.5 * curvature * u), math.cos(0.5 * curvature * u)
         chord, sin2, cos2 = 2.0 * sin / curvature, 2.0 * sin * cos, 1.0 - 2.0 * sin * sin
-        position = np.array((x + chord * (cos * tx - sin * ty), y + chord * (cos * ty + sin * tx)))
-        return position, np.array((cos2 * tx - sin2 * ty, cos2 * ty + sin2 * tx))
+        x, y = x + chord * (cos * tx - sin * ty), y + chord * (cos * ty + sin * tx)
+        return x, y, cos2 * tx - sin2 * ty, cos2 * ty + sin2 * tx
 
 
 def shortest_path(start: ArrayLike, goal: ArrayLike, rows: Array, keep: ArrayLike) -> Path:

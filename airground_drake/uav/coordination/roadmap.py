@@ -238,7 +238,7 @@ def _path_nodes(space: Space, path: Path, pitch: float) -> Array:
     gap = max(min(pitch, flat), path.length_m / MOST_PATH_NODES)
     ends = np.concatenate([[0.0], np.cumsum(path.pieces[:, 5])])
     along = _spread(ends, np.maximum(1, np.ceil(np.diff(ends) / gap)).astype(np.int64))
-    return np.array([path.at(s)[0] for s in along[1:]]).reshape(-1, 2)
+    return path.points(along[1:].tolist())
 
 
 @njit(cache=True)

@@ -32,6 +32,7 @@ def length_or_inf(start: Point, goal: Point, discs: list[Disc]) -> float:
 def sample(path: Path, n: int = 200) -> tuple[Array, Array, Array]:
     s = np.linspace(0.0, path.length_m, n)
     points, tangents = zip(*(path.at(float(x)) for x in s), strict=True)
+    assert np.array_equal(path.points(s.tolist()), points)
     return s, np.array(points), np.array(tangents)
 
 
