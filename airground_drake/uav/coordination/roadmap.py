@@ -152,7 +152,8 @@ def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: S
     grid = _grid(points, low, reach)
     pairs = _pairs(grid, number, radii, partner, shut)
     free = space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])
-    return Roadmap(grid, *_in_rows(points, pairs, free), reach, tuple(robots))
+    first, heads, lengths = _in_rows(points, pairs, free)
+    return Roadmap(grid, first, heads, lengths, reach, tuple(robots))
 
 
 def _lattice(space: Space, low: Array, high: Array, pitch: float) -> tuple[Array, Indices]:

@@ -99,7 +99,8 @@ def find(
     key = frozenset((id(other.motion), other.radius, other.until) for other in others), follow
     known = mover.found.get(key)
     if known is None or known.spent > budget or (known.way is None and known.latest < latest):
-        known = Found(*_found(mover, fixed, follow, budget, others, latest), latest, others)
+        way, spent = _found(mover, fixed, follow, budget, others, latest)
+        known = Found(way, spent, latest, others)
         if known.spent < budget:
             mover.found[key] = known
     return known.way, known.spent
@@ -136,7 +137,7 @@ def _found(
 
 
 def _blocked(mover: Mover, other: OtherRobot) -> Blocked:
-    """What another robot blocks; as long as it counts as an obstacle."""
+    """What another robot blocks, as if it always counted as an obstacle."""
     key = id(other.motion), other.radius
     known = mover.blocked.pop(key, None) or _blocked_by(mover, other)
     mover.blocked[key] = known
@@ -155,7 +156,8 @@ def _blocked_by(mover: Mover, other: OtherRobot) -> Blocked:
     wished = _wished(space, other)
     clear = free_pieces(preset, other.motion, wished - ROUNDING_M)
     at_end = distance(preset[-1:], other.motion, float(preset[-1, 0])) >= min(wished, at_last) - ROUNDING_M
-    return Blocked(*intervals.blocked_times(other.motion, roadmap.grid, radii), clear, at_end, other.motion)
+    nodes, times = intervals.blocked_times(other.motion, roadmap.grid, radii)
+    return Blocked(nodes, times, clear, at_end, other.motion)
 
 
 def _joins(mover: Mover, blocked: Sequence[Blocked], follow: float) -> Array:
