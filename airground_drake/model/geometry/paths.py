@@ -15,7 +15,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import accumulate
 from typing import Self
 
@@ -337,7 +337,7 @@ def _exit(p: complex, around: _Obstacles) -> complex:
     e = np.where(abs(p - c) > EPS, p - c, 1.0)  # along +x from a centre
     u, length = (end - begin) / abs(end - begin), abs(end - begin)
     feet = begin + np.clip(((p - begin) * u.conj()).real, 0.0, length) * u
-    i, j = _pairs(len(begin))
+    i, j = np.triu_indices(len(begin), 1)
     with np.errstate(divide="ignore", invalid="ignore"):  # of parallel edges
         share = ((begin[j] - begin[i]) * u[j].conj()).imag / (u[i] * u[j].conj()).imag
     met = (share >= 0.0) & (share <= length[i])
@@ -346,13 +346,6 @@ def _exit(p: complex, around: _Obstacles) -> complex:
         feet, begin[i[met]] + share[met] * u[i[met]],
     ))  # fmt: skip
     return complex(min(candidates[around.clear(candidates)], key=lambda z: float(abs(z - p))))
-
-
-@lru_cache(maxsize=16)
-def _pairs(count: int) -> tuple[Indices, Indices]:
-    """Indices of both members of all pairs of `count` items, read-only."""
-    i, j = np.triu_indices(count, 1)
-    return i, j
 
 
 def _straight(begin: complex, end: complex) -> Array:

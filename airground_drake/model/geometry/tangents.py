@@ -40,17 +40,17 @@ class Around(NamedTuple):
 
 @njit(cache=True)
 def shortest(p: complex, q: complex, around: Around) -> Array:
-    """Pieces (see `Path`), (k, 6), of the shortest way between two different free points; k = 0 if there is none."""
+    """The shortest way between two different free points: its pieces, (k, 6), see `Path`; k = 0 without a way."""
     at, marks, edges = [p, q], [(0, 0.0, 0)], [(0, 0, 0.0, 0, 0.0)]
     marks.pop()
     edges.pop()
     _join_tangents(around, at, marks, edges)
     points, circles = meetings(around.c, around.r, around.begin, around.end)
-    for point, (i, j) in zip(points, circles):  # noqa: B905
-        heappush(marks, (i, phase(point - around.c[i]), len(at)))
-        if j >= 0:
-            heappush(marks, (j, phase(point - around.c[j]), len(at)))
-        at.append(point)
+    for k in range(len(points)):
+        for i in circles[k]:
+            if i >= 0:
+                heappush(marks, (i, phase(points[k] - around.c[i]), len(at)))
+        at.append(points[k])
     _join_arcs(around, marks, edges)
     last = _searched(len(at), edges)
     count, node = 0, 1

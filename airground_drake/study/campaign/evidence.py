@@ -181,8 +181,8 @@ def _by_chance(table: Array, method: MonteCarloMethod | None = None) -> tuple[fl
     """Probability of differences as large if the keys have no effect, and less chi-squared for each cell."""
     if min(table.shape) < 2:
         return 1.0, 0.0
-    found = chi2_contingency(table, correction=False, method=method)
-    return float(found.pvalue), -float(found.statistic) / table.size
+    chi2 = chi2_contingency(table, correction=False, method=method)
+    return float(chi2.pvalue), -float(chi2.statistic) / table.size
 
 
 def _parts(values: pd.Series) -> pd.Series | None:

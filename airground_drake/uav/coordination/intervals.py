@@ -101,7 +101,7 @@ def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Arr
 
 @njit(cache=True)
 def _without_overlaps(count: int, nodes: Indices, times: Array) -> tuple[Indices, Array]:
-    """Blocked times, sorted by node, of which those that overlap or touch are one."""
+    """Blocked times sorted by node; times of a node that overlap or touch are joined."""
     first, by_node = times_by_node(count, nodes, times)
     total = 0
     for n in range(count):
