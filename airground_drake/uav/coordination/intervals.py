@@ -96,18 +96,18 @@ def blocked_times(motion: Array, grid: Grid, radii: Array) -> tuple[Indices, Arr
                     nodes, times = np.append(nodes, nodes), np.concatenate((times, times))
                 nodes[count], times[count, 0], times[count, 1] = n, begin + entry, begin + leave
                 count += 1
-    return _without_overlaps(len(radii), nodes[:count], times[:count])
+    return _joined(len(radii), nodes[:count], times[:count])
 
 
 @njit(cache=True)
-def _without_overlaps(count: int, nodes: Indices, times: Array) -> tuple[Indices, Array]:
-    """Blocked times sorted by node; times of a node that overlap or touch are joined."""
+def _joined(count: int, nodes: Indices, times: Array) -> tuple[Indices, Array]:
+    """Times blocked by one motion, sorted by node; those of a node that touch are one."""
     first, by_node = times_by_node(count, nodes, times)
     total = 0
     for n in range(count):
         for k in range(first[n], first[n + 1]):
             if k > first[n] and by_node[k, 0] <= times[total - 1, 1]:
-                times[total - 1, 1] = max(times[total - 1, 1], by_node[k, 1])
+                times[total - 1, 1] = by_node[k, 1]
                 continue
             nodes[total], times[total, 0], times[total, 1] = n, by_node[k, 0], by_node[k, 1]
             total += 1

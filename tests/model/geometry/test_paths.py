@@ -84,6 +84,7 @@ def round_one(half: float, radius: float) -> float:
         ((0.0, 0.1), (0.0, 5.0), [(-0.8, 0.0, 1.0), (0.8, 0.0, 1.0)], 4.9),  # from a lens, by its corner
         *(((rim * math.cos(1.0), rim * math.sin(1.0)), (rim * math.cos(3.0), rim * math.sin(3.0)), [(0.0, 0.0, 2.0)],
            4.0) for rim in (2.0 - 0.9e-9, 2.0 - 1e-12, 2.0, 2.0 + 0.9e-9)),  # on a circle within the tolerance
+        ((4.0, 0.0), (2.0 - 0.9e-9, 0.0), [(0.0, 0.0, 2.0)], 2.0),  # the goal only
     ],
 )  # fmt: skip
 def test_known_lengths(start: Point, goal: Point, discs: list[Disc], length: float) -> None:

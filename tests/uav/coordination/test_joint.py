@@ -15,7 +15,7 @@ from planner import alcove
 from properties import examples
 
 from airground_drake.model.geometry import outline
-from airground_drake.uav.coordination import intervals
+from airground_drake.uav.coordination import intervals, neighbourhoods
 from airground_drake.uav.coordination.joint import Effort, Plan, plan
 from airground_drake.uav.coordination.roadmap import RobotTask, Space, build_roadmap
 from airground_drake.uav.coordination.single import Mover, OtherRobot, _wished, find, sum_of_times
@@ -197,6 +197,30 @@ def test_a_way_is_found_if_the_robot_can_be_back_in_time(seed: int, count: int, 
         assert np.array_equal(again.motion, best.motion)
     if spent > 0:
         assert find(movers[0], others, 5.0, spent - 1)[1] <= spent - 1
+
+
+def test_a_robot_that_leaves_is_not_taken_for_one_that_stays() -> None:
+    """It stands on the target of another one."""
+    one = task((-4.0, 0.0), (4.0, 0.0))
+    roadmap = build_roadmap([space()], [one])
+    mover, stands = Mover.on(roadmap, space(), one, 1.0, roadmap.robots[0]), OtherRobot(np.array([[0.0, 4.0, 0.5]]))
+    leaves = stands._replace(until=5.0)
+    ways = [find(mover, [], 5.0, 10**6, [leaves])[0], find(mover, [stands], 5.0, 10**6)[0]]
+    assert [way is None for way in ways] == [False, True]
+
+
+@given(seed=st.integers(0, 10**6), count=st.integers(2, 5))
+@examples(20)
+def test_searches_that_end_without_a_gain_change_no_plan(seed: int, count: int) -> None:
+    room, tasks = random_team(seed, count, 3, 12.0)
+    searched = neighbourhoods.find
+    found = plan(room, tasks, [1.0] * count)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(neighbourhoods, "find", lambda *given, latest: searched(*given))
+        exhaustive = plan(room, tasks, [1.0] * count)
+    assert found.expansions <= exhaustive.expansions
+    for one, other in zip(motions(found, tasks), motions(exhaustive, tasks), strict=True):
+        assert np.array_equal(one, other)
 
 
 def test_the_preset_is_joined_where_it_is_free_again() -> None:
