@@ -73,7 +73,7 @@ def shortest(p: complex, q: complex, around: Around) -> Array:
 @njit(cache=True)
 def _join_tangents(around: Around, at: list[complex], marks: list[Mark], edges: list[Edge]) -> None:
     """Add the free common tangents of all circles, and of start and goal, which are circles of radius 0."""
-    # A tangent that cuts the polygon about whose corner the circle is, is left out.
+    # A tangent that cuts the polygon of its own corner would be blocked by it; leaving it out first is much faster.
     c, r = np.concatenate((np.array(at), around.c)), np.concatenate((np.zeros(2), around.r))
     blocker = -1
     for f in range(len(r)):
