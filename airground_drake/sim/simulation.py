@@ -127,7 +127,7 @@ class Recorder:
             self.advance(simulator, self._scenario.duration_s if duration is None else duration)
         finally:
             for planner in self.model.planners.values():
-                planner.close()
+                planner.database.close()
         return self.trace(simulator, seed, time.perf_counter() - started)
 
     def begin(

@@ -90,7 +90,7 @@ class BehaviourDatabase:
     _asking: Any = field(default_factory=Lock, init=False)
 
     def close(self) -> None:
-        """End the processes of third-party policies."""
+        """End the processes of third-party policies; the next run starts them again."""
         for _, policy in self.policies:
             if isinstance(policy, GuestPolicy):
                 policy.close()

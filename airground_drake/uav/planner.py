@@ -65,10 +65,6 @@ class PlannerState(Immutable):
     seen: tuple[tuple[Sighting, float], ...] = ()
     memories: tuple[Any, ...] = ()  # `Policy.remembered` of the policies
 
-    @property
-    def faults(self) -> list[Asked]:
-        return [asked for asked in self.asked if asked.what]
-
     @cached_property
     def proposals(self) -> Proposals:
         """The proposals in force, one entry per UGV."""

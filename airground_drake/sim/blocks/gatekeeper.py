@@ -39,7 +39,7 @@ class Gatekeeper(LeafSystem):
         in  `bodies` (3M) m; `team_command` (3r) m/s, for the predicted motion of the other robots; `gains`, the
             `UgvGains` that the controllers run with; `proposals` abstract, n of Proposal or None. With unicycles
             `headings` (n), rad.
-        out `answers` (2n), an `Answer` per UGV, and `reports` (abstract), see `messages`; held.
+        out `answers` (2n) and `reports` (abstract), see `messages`; held.
         With a channel `inbox`, see `Downlink`, in place of `proposals`, which is an output for the controllers then;
         and an output `outbox`, all answers sent so far.
     State: abstract, a `GatekeeperState`, with all decisions of the run so far.

@@ -91,14 +91,6 @@ class InterventionPlanner(LeafSystem):
         """The policies."""
         return self._planner.database
 
-    def instant(self, number: int) -> float:
-        """Time of a planning instant, s; the first one, 0, is at 0 s."""
-        return self._ticks.instant(number)
-
-    def close(self) -> None:
-        """End the processes of policies; the next run starts them again."""
-        self._planner.database.close()
-
     def _watch(self, context: Context, discrete: DiscreteValues) -> EventStatus:
         if not self._ticks.due(context.get_time()):
             return EventStatus.DidNothing()

@@ -17,8 +17,6 @@ from airground_drake.uav.policy import Proposal
 # Trigger state of one UGV: `automaton.Mode`, number of triggers, times of the last trigger and the last release (-1
 # before the first).
 Status = namedview("Status", ["mode", "triggers", "triggered_at_s", "released_at_s"])
-# Answer of one UGV: `messages.ACCEPT`, REFUSE or SILENT, and the number of the proposal.
-Answer = namedview("Answer", ["answer", "number"])
 # Parameters of `UgvController`: A of (8), B of (6), Lambda of (14).
 UgvGains = namedview("UgvGains", ["avoidance_gain_1_s", "motion_gain_1_s", "intervention_gain_1_s"])
 # Parameters of `UavController`: A of (11), C of (10).
