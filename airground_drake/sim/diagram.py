@@ -56,7 +56,6 @@ RECORDED = (
 # of unicycles, of measured positions, and of positions that go from UGV to UGV.
 OF_SOME = ("plant_signals", "own_headings", "command_share", "published", "seen_by_uav", "announced", "heard_s")
 
-NO_NAMES: Mapping[str, str] = MappingProxyType({})
 NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
 
 # Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
@@ -363,7 +362,7 @@ def _assembled(
         builder.Connect(source, target)
     inputs = set()
     for port in (port for system in systems.values() for port in inputs_of(system)):
-        wanted = renamed.get(port.get_system(), NO_NAMES).get(port.get_name(), port.get_name())
+        wanted = renamed.get(port.get_system(), {}).get(port.get_name(), port.get_name())
         if builder.IsConnectedOrExported(port):
             continue
         with raised_as(lambda error: PluginError(described(error))):  # a user's block may have ports of other sizes

@@ -117,21 +117,15 @@ class UgvController(_Controller):
         headings = None if self._headings is None else self._headings.Eval(context)
         law = self._in_force(context)
         velocity = self._commanded(context, context.get_time(), positions, reference, rate, proposals, headings, law)
-        if headings is not None:
-            discrete.set_value(2, self.shorten(velocity, headings))
+        steering = self._world.steering
+        if headings is not None and steering is not None:  # there are both, or neither
+            discrete.set_value(2, steer_all(velocity, headings, steering, self.law.avoidance.period))
         discrete.set_value(0, velocity.ravel())
         discrete.set_value(1, [NOTHING if proposal is None else float(proposal.number) for proposal in proposals])
 
     def _commanded(self, context: Context, t: float, positions: Array, *about: Any) -> Array:
         """`velocity`; subclasses also use further ports."""
         return self.velocity(t, positions, *about)
-
-    def shorten(self, velocity: Array, headings: Array) -> Array:
-        """Shorten commands (n, 3), m/s, in place, to feasible ones for unicycles with headings (n,), rad."""
-        if self._world.steering is None:
-            return np.ones(len(velocity))
-        left: Array = steer_all(velocity, headings, self._world.steering, self.law.avoidance.period)
-        return left
 
     def velocity(
         self,
