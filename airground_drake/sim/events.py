@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.model.bodies.kinds import ROBOTS
-from airground_drake.model.bodies.motion import PeriodMotion
+from airground_drake.model.bodies.motion import SAME_S, PeriodMotion
 from airground_drake.model.bodies.world import Body
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.encounter import least_apart
@@ -22,7 +22,6 @@ from airground_drake.sim.trace import Trace
 from airground_drake.ugv.reasons import OVER
 
 FEW = 8  # a shape of so many convex parts is first looked at as a whole: most robots come near to nothing
-SAME_S = 1e-9  # times this close are one, s
 ROUNDING_M = 1e-9  # what such a look leaves for rounding, m
 
 

@@ -12,9 +12,8 @@ from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.history import Immutable
 from airground_drake.model.bodies.motion import SAME_S
 from airground_drake.model.geometry import outline
@@ -263,7 +262,7 @@ class Planner:
         remembered = tuple(map(memories.get, range(len(self.database.policies))))
         return replace(memory, talks=tuple(talks), asked=tuple(asked), memories=remembered)
 
-    def _there(self, t: float) -> npt.NDArray[np.bool_]:
+    def _there(self, t: float) -> Flags:
         """Which outlines on the map exist at time t, s, (m,)."""
         there = np.less_equal(self.mapped_from, t + SAME_S) & np.less(t + SAME_S, self.mapped_until)
         return np.broadcast_to(there, len(self.mapped))

@@ -118,7 +118,7 @@ class OutcomeGatekeepers(Gatekeepers):
         after = replace(self._answered(now, known, verdicts), commitments=tuple(held))
         return replace(after, quiet=self._quiet(now.proposals, after))
 
-    def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> np.ndarray:
+    def _remembered(self, t: float, positions: Array, before: GatekeeperState) -> Flags:
         """Which outlines each UGV has sensed up to time t, s, and has not seen disappear, (n, m)."""
         # The very same array if nothing changes.
         still, own = self._world.at(self._near, t).still, positions[self._near.members]

@@ -7,13 +7,12 @@ import numpy as np
 from pydrake.solvers import MathematicalProgram, QuadraticConstraint, SnoptSolver, SolutionResult, SolverOptions
 
 from airground_drake.base.arrays import Array
+from airground_drake.ugv.binary_program import AXES
 from airground_drake.ugv.budget import Budget
 from airground_drake.ugv.problem import Evaluation, Problem
 from airground_drake.ugv.relaxation import sum_up_rounding, unavoidable_cost, within_reach
 from airground_drake.ugv.routes.guard import Guarded, without_optimum
 from airground_drake.ugv.solution import ConstantPlans, Solution, Status, cheapest, cut_short
-
-_AXES = 2  # UGVs move in their plane
 
 _OPTIONS = {"Major optimality tolerance": 1e-5, "Major feasibility tolerance": 1e-6}  # of SNOPT
 # Its options that are this multiple of the budget's iterations.
@@ -88,7 +87,7 @@ def relaxation(problem: Problem, start: Evaluation) -> tuple[MathematicalProgram
     # `start` is the plan whose states are the initial guess. Returns the program, its variables omega (N,), and an
     # initial guess for all of its variables.
     stages, dt = problem.stages, problem.dt
-    size = _AXES * stages
+    size = AXES * stages
     stage, point = np.nonzero(within_reach(problem))
     program = MathematicalProgram()
     e = program.NewContinuousVariables(size, "e")
@@ -96,7 +95,7 @@ def relaxation(problem: Problem, start: Evaluation) -> tuple[MathematicalProgram
     u = program.NewContinuousVariables(stages, "u")
     r = program.NewContinuousVariables(len(stage), "r")
 
-    of_error, of_slack = problem.terms.error_weights.repeat(_AXES), np.full(stages, problem.slack_weight)
+    of_error, of_slack = problem.terms.error_weights.repeat(AXES), np.full(stages, problem.slack_weight)
     for weights, variables in ((of_error, e), (of_slack, u)):  # (25)
         hessian = np.diag(2.0 * weights * dt)
         program.AddQuadraticCost(hessian, np.zeros(len(variables)), variables, is_convex=True)
@@ -104,11 +103,11 @@ def relaxation(problem: Problem, start: Evaluation) -> tuple[MathematicalProgram
     program.AddBoundingBoxConstraint(0.0, np.inf, u)  # (27e)
 
     before = np.vstack([problem.initial, problem.reference[:-1]])
-    drift = (dt * problem.refuse + before - problem.reference)[:, :_AXES]
+    drift = (dt * problem.refuse + before - problem.reference)[:, :AXES]
     change = np.zeros((size, stages))
-    for axis in range(_AXES):
-        change[_AXES * np.arange(stages) + axis, np.arange(stages)] = dt * (problem.accept - problem.refuse)[:, axis]
-    dynamics = np.hstack([np.eye(size) - np.eye(size, k=-_AXES), -change])
+    for axis in range(AXES):
+        change[AXES * np.arange(stages) + axis, np.arange(stages)] = dt * (problem.accept - problem.refuse)[:, axis]
+    dynamics = np.hstack([np.eye(size) - np.eye(size, k=-AXES), -change])
     program.AddLinearEqualityConstraint(dynamics, drift.ravel(), np.concatenate([e, omega]))  # (23), (27b)
 
     distance = problem.distances[point]
@@ -127,12 +126,12 @@ def relaxation(problem: Problem, start: Evaluation) -> tuple[MathematicalProgram
         # (27d): ||e + away||^2 >= r^2
         program.AddQuadraticConstraint(
             hessian, np.array([2.0 * away[i, 0], 2.0 * away[i, 1], 0.0]), -float(away[i] @ away[i]), np.inf,
-            np.array([e[_AXES * k], e[_AXES * k + 1], r[i]]), QuadraticConstraint.HessianType.kIndefinite,
+            np.array([e[AXES * k], e[AXES * k + 1], r[i]]), QuadraticConstraint.HessianType.kIndefinite,
         )  # fmt: skip
 
     lacking = np.maximum(0.0, distance - np.linalg.norm(offset, axis=1))
     slack = np.zeros(stages)
     np.maximum.at(slack, stage, lacking)
-    errors = (start.positions - problem.reference)[:, :_AXES].ravel()
+    errors = (start.positions - problem.reference)[:, :AXES].ravel()
     guess = np.concatenate([errors, start.omega, slack, np.maximum(0.0, distance - slack[stage])])
     return program, omega, guess
