@@ -60,7 +60,7 @@ NO_PLANTS: Mapping[str, OwnPlant] = MappingProxyType({})
 
 # Makes the block that computes the decision variables of n UGVs from their world and their presets: a System with the
 # output ports `decision_variable` (n), m, and `decision_range` (2n), m, the smallest and the largest since the
-# simulator's step began. Its input ports are fed by name. `systems.DecisionBlock` is a base for such blocks.
+# simulator's step began. Its input ports are fed by name. `sim.blocks.DecisionBlock` is a base for such blocks.
 DecisionFactory = Callable[[World, Sequence[Motion]], System]
 
 
@@ -98,7 +98,7 @@ def build_diagram(
         composition: of the UGVs' avoidance tasks; default: 'augmented', or without `method` that of the last run.
         plants: plants of your own, by robot, in place of those of the scenario.
         monitor: watches the diagram while it runs; see `make_monitor`.
-        decision_block: makes the block that drives the trigger. The default, `systems.DecisionVariable`, is (15).
+        decision_block: makes the block that drives the trigger. The default, `sim.blocks.DecisionVariable`, is (15).
         ugv_controller: makes a controller of your own for all UGVs, in place of that of the scenario: a System with the
             output ports of `UgvController`, whose input ports are fed by name; see docs/extending.md.
 

@@ -90,7 +90,7 @@ class Trace:
 
     Attributes:
         meta: strict JSON: `schema`, `run` (identifier), `method`, `composition`, `seed`, `robots`, `ugvs`
-            (names, array order; the UAV is the last robot), `zeta_m` (threshold in force), `scenario` (the
+            (names, array order; UAVs are the last robots), `zeta_m` (threshold in force), `scenario` (the
             resolved scenario as nested dicts), `events` (list, by time), `controllers` (what the controllers were
             built with, read back from the diagram: see `sim.blocks.controllers.read_back`), `decision_block` (name of
             the class that computes the decision variables, read back from the diagram; empty for that of (15)),
@@ -127,7 +127,7 @@ class Trace:
 
     @property
     def robots(self) -> list[str]:
-        """Names of all robots: the UGVs, then the UAV."""
+        """Names of all robots: the UGVs, then the UAVs."""
         return list(self.meta["robots"])
 
     @property

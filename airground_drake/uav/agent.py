@@ -1,4 +1,4 @@
-"""The policy through which the agent of a step-wise environment proposes: see `environments`."""
+"""The policy through which the agent of a step-wise environment proposes: see `study.environments`."""
 
 from collections.abc import Mapping
 

@@ -1,7 +1,7 @@
 """Tasks of the UAV: track a position, stay over the centroid.
 
 The UAV's controller runs the task it is given, by default `FormationTask`. The UGVs' law is compiled and has its tasks
-written out: distances (7)-(8) as inequalities (`kernels.py`), tracking (6) and the intervention (14) (`law.py`).
+written out: distances (7)-(8) as inequalities (`kernels.py`), tracking (6) and the intervention (14) (`ugv_law.py`).
 """
 
 import numpy as np

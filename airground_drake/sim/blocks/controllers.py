@@ -305,7 +305,7 @@ def _finite(positions: Array) -> Array:
 
 
 def _velocity_of(task: str, answer: object, position: Array) -> Array:
-    """The velocity demanded by a task, checked; `name` is for messages."""
+    """The velocity demanded by a task, checked; `task` is its name, for messages."""
     try:
         asked = np.asarray(answer)
     except ValueError as error:  # rows of different lengths

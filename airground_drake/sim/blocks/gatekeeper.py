@@ -126,7 +126,7 @@ class DirectAcceptance(LeafSystem):
     """
 
     def __init__(self, count: int, *, channel_period: float | None = None) -> None:
-        """Declare the ports for `count` UGVs; with a channel, `control` is the controllers' period, s."""
+        """Declare the ports for `count` UGVs; with a channel, `channel_period` is the controllers' period, s."""
         super().__init__()
         self._channel = channel_period is not None
         if channel_period is None:

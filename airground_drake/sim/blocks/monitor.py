@@ -78,8 +78,8 @@ class Laws:
     Attributes:
         ugvs: commands (n, 3), m/s, from the time, positions (M, 3), preset positions and velocities (n, 3) each, the
             accepted proposal or None of each UGV, and with unicycles the headings (n,), rad.
-        uav: command (3,), m/s, from the time, positions (M, 3), m, and the UGVs' commands (n, 3), m/s, one sample
-            earlier.
+        uav: commands of u UAVs, (u, 3), m/s, from the time, positions (M, 3), m, and the UGVs' commands (n, 3), m/s,
+            one sample earlier.
     """
 
     ugvs: Callable[[float, Array, Array, Array, Sequence[Proposal | None], Array | None], Array]

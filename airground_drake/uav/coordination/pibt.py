@@ -269,7 +269,7 @@ def follow(graph: CoarseGraph, team: Team, step: Step, j: int, there: int) -> No
 
 @njit(cache=True)
 def sort_moves(graph: CoarseGraph, team: Team, step: Step, i: int, moves: Indices) -> int:
-    """Write the possible moves of robot i into `found`, the nearest to its target first; returns their number."""
+    """Write the possible moves of robot i into `moves`, the nearest to its target first; returns their number."""
     first, heads, to_go = graph.first, graph.heads, team.to_go
     here, layer, number = step.at[i], step.counts[3], step.counts[4]
     later = min(layer + 1, len(to_go) - 1)
