@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -44,14 +44,12 @@ WAITING = 0.5  # what it costs to wait for a step while others with known motion
 # values than this. In the last step, all that is left of a known motion counts as being in the way.
 MOST_LAYERS, MOST_VALUES = 400, 10_000_000
 
-Outcome = Literal["found", "exhausted", "effort spent"]
-
 
 @dataclass(frozen=True, eq=False)
 class FirstPlan:
     """The result of `first_plan`."""
 
-    outcome: Outcome  # whether a plan was found; if not, whether every coarse roadmap was searched to the end
+    outcome: lacam.Status  # whether a plan was found; if not, whether every coarse roadmap was searched to the end
     ways: tuple[Way, ...]  # one per robot; empty without a plan
     candidates: int  # the effort
 
@@ -100,32 +98,30 @@ class _Search:
     def __init__(self, movers: Sequence[Mover], fixed: Sequence[OtherRobot], share: float, width: float) -> None:
         self._movers, self._fixed, self._share, self._width = movers, fixed, share, width
         self.exhausted = False
-        self._made: tuple[Coarse, Team, float] | None = None
 
-    def _make(self) -> tuple[Coarse, Team, float]:
-        if self._made is None:
-            coarse = coarsened(self._movers, self._width)
-            longest = [float(coarse.graph.lengths[can].max()) for can in coarse.usable]
-            # every robot can travel every edge that it can use in a step
-            step = max(length / mover.speed for length, mover in zip(longest, self._movers, strict=True))
-            shut = _shut(coarse, self._movers, self._fixed, step)
-            apart = np.array([[own.space.apart + other.task.body for other in self._movers] for own in self._movers])
-            to_go = _to_go(coarse, shut, WAITING * self._width)
-            swaps = self._share >= SWAPS_FROM
-            team = Team(coarse.targets, coarse.usable, coarse.sizes, shut, apart, to_go, swaps, 0.0)
-            self._made = coarse, team, step
-        return self._made
+    @cached_property
+    def _made(self) -> tuple[Coarse, Team, float]:
+        """The roadmap, the robots on it, and the duration of a step, s."""
+        coarse = coarsened(self._movers, self._width)
+        longest = [float(coarse.graph.lengths[can].max()) for can in coarse.usable]
+        # every robot can travel every edge that it can use in a step
+        step = max(length / mover.speed for length, mover in zip(longest, self._movers, strict=True))
+        shut = _shut(coarse, self._movers, self._fixed, step)
+        apart = np.array([[own.space.apart + other.task.body for other in self._movers] for own in self._movers])
+        to_go = _to_go(coarse, shut, WAITING * self._width)
+        swaps = self._share >= SWAPS_FROM
+        return coarse, Team(coarse.targets, coarse.usable, coarse.sizes, shut, apart, to_go, swaps, 0.0), step
 
     def run(self, candidates: int, turn: int) -> lacam.Steps:
         """Search within this effort; `turn` selects the shuffling of moves."""
-        coarse, team, _ = self._make()
+        coarse, team, _ = self._made
         shuffled = team._replace(noise=NOISES[turn % len(NOISES)] * self._width)
         result = lacam.search(coarse.graph, shuffled, coarse.starts, candidates, turn)
         self.exhausted = result.status == "exhausted"
         return result
 
     def timed(self, moves: Indices) -> list[Way]:
-        coarse, team, step = self._make()
+        coarse, team, step = self._made
         short = network.without_loops(coarse.graph, team, moves)
         motions = network.motions(coarse.graph, team, short, [mover.speed for mover in self._movers])
         if not self._keeps_from_fixed(motions):
