@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.uav.coordination.intervals import Indices
 from airground_drake.uav.coordination.roadmap import Space
@@ -52,7 +52,7 @@ class Coarse(NamedTuple):
     graph: CoarseGraph  # all nodes and edges
     starts: Indices  # node of each robot's start, (n,); no edge leads to it
     targets: Indices  # node of each robot's target, (n,)
-    usable: npt.NDArray[np.bool_]  # which edges each robot can use, (n, E)
+    usable: Flags  # which edges each robot can use, (n, E)
     sizes: Indices  # index of each robot's size, (n,); robots of one size keep the same distances
 
 
@@ -124,7 +124,7 @@ def _packed(
     heads: npt.NDArray[np.int32],
     lengths: Array,
     always: Indices,
-    wanted: npt.NDArray[np.bool_],
+    wanted: Flags,
     width: float,
 ) -> Indices:
     """The nodes `always`, then the `wanted` nodes, in order, that are at least `width`, m, from all chosen ones."""

@@ -13,17 +13,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.uav.coordination import lacam, network
 from airground_drake.uav.coordination.coarse import Coarse, CoarseGraph, coarsened
 from airground_drake.uav.coordination.intervals import Indices
 from airground_drake.uav.coordination.pibt import Team
-from airground_drake.uav.coordination.single import ROUNDING_M, Mover, OtherRobot, Way, sum_of_times
+from airground_drake.uav.coordination.roadmap import ROUNDING_M
+from airground_drake.uav.coordination.single import Mover, OtherRobot, Way, sum_of_times
 from airground_drake.uav.coordination.timed import closest, distance, without_repeats
 
 # Distances of coarse nodes, as shares of the distance that robots keep. With the first, a robot can follow another one
@@ -148,7 +148,7 @@ def _way(mover: Mover, motion: Array) -> Way:
     return Way(motion, end, len(motion))
 
 
-def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], step: float) -> npt.NDArray[np.bool_]:
+def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], step: float) -> Flags:
     """Edges that are shut because known motions are near, see `Team.shut`."""
     last = max((float(other.motion[-1, 0]) for other in fixed), default=0.0)
     most = min(MOST_LAYERS, MOST_VALUES // (len(movers) * len(coarse.graph.places)))
@@ -163,7 +163,7 @@ def _shut(coarse: Coarse, movers: Sequence[Mover], fixed: Sequence[OtherRobot], 
 
 
 @njit(cache=True)
-def _shut_by(graph: CoarseGraph, motion: Array, apart: float, step: float, shut: npt.NDArray[np.bool_]) -> None:
+def _shut_by(graph: CoarseGraph, motion: Array, apart: float, step: float, shut: Flags) -> None:
     """Mark the edges that bring a robot too near to a known motion in each step."""
     # motion: (M, 3); step: s
     # shut: the result, (L, E).
@@ -192,7 +192,7 @@ def _shut_by(graph: CoarseGraph, motion: Array, apart: float, step: float, shut:
             shut[k, e] = closest(line, motion, begin, end) < min(apart, first) - ROUNDING_M
 
 
-def _to_go(coarse: Coarse, shut: npt.NDArray[np.bool_], waiting: float) -> Array:
+def _to_go(coarse: Coarse, shut: Flags, waiting: float) -> Array:
     """Ways to the targets, see `Team.to_go`; in all steps but the last ones, waiting counts as a way, too."""
     # waiting: m
     graph = coarse.graph
@@ -223,8 +223,8 @@ def _ways_to(target: int, count: int, tails: Indices, heads: Indices, lengths: A
 @njit(cache=True)
 def _step_back(
     graph: CoarseGraph,
-    usable: npt.NDArray[np.bool_],
-    shut: npt.NDArray[np.bool_],
+    usable: Flags,
+    shut: Flags,
     target: int,
     waiting: float,
     later: Array,

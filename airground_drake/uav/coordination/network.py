@@ -12,13 +12,13 @@ near, its moves to and from there conflict with that move; so the order says tha
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.uav.coordination.coarse import CoarseGraph
 from airground_drake.uav.coordination.intervals import Indices
-from airground_drake.uav.coordination.pibt import ROUNDING_M, Team, conflicts
+from airground_drake.uav.coordination.pibt import Team, conflicts
+from airground_drake.uav.coordination.roadmap import ROUNDING_M
 from airground_drake.uav.coordination.timed import without_repeats
 
 SHORTEST_S = 1e-6  # shortest duration of a move, s
@@ -32,9 +32,7 @@ def without_loops(graph: CoarseGraph, team: Team, moves: Indices) -> Indices:
 
 
 @njit(cache=True)
-def _cut_loops(
-    graph: CoarseGraph, targets: Indices, apart: Array, shut: npt.NDArray[np.bool_], sizes: Indices, moves: Indices
-) -> None:
+def _cut_loops(graph: CoarseGraph, targets: Indices, apart: Array, shut: Flags, sizes: Indices, moves: Indices) -> None:
     first, heads = graph.first, graph.heads
     steps, count = moves.shape
     for i in range(count):

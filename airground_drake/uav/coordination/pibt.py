@@ -17,14 +17,13 @@ less. Functions are compiled by numba.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.uav.coordination.coarse import CoarseGraph
 from airground_drake.uav.coordination.intervals import Indices
+from airground_drake.uav.coordination.roadmap import ROUNDING_M
 
-ROUNDING_M = 1e-9
 LONGEST_CHAIN = 1000  # largest number of nodes of a corridor that the swap rule follows
 
 
@@ -32,11 +31,11 @@ class Team(NamedTuple):
     """Robots on a coarse roadmap with N nodes and E edges."""
 
     targets: Indices  # node of each robot's target, (n,)
-    usable: npt.NDArray[np.bool_]  # which edges each robot can use, (n, E)
+    usable: Flags  # which edges each robot can use, (n, E)
     sizes: Indices  # index of each robot's size, (n,)
     # Edges that robots of each size cannot use in each layer, as robots with known motions are near, (S, L, E). Layer k
     # is the step with this number; the last layer is of all later steps.
-    shut: npt.NDArray[np.bool_]
+    shut: Flags
     apart: Array  # distances to keep between robots, (n, n), m
     to_go: Array  # way from each node to the target, (L, n, N), m; infinite: none
     swaps: bool  # whether the swap rule is used
@@ -54,7 +53,7 @@ class Step(NamedTuple):
     frames: Indices  # see `give`, (n, 6)
     lists: Indices  # moves of the robots in the frames, best first, (n, largest number of edges at a node)
     # Robots that could not make way for another one, (n,); they are not asked again in this step.
-    failed: npt.NDArray[np.bool_]
+    failed: Flags
 
 
 @njit(cache=True)

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.paths import NoPath, Path, shortest_path
@@ -29,7 +28,7 @@ MOST_PATH_NODES = 2_000
 # Share of the clearance that edges keep. Chords of the arcs of shortest paths come nearer to discs than the arcs.
 CHORDS = 0.5
 ARCS = 0.75  # share of the clearance that shortest paths keep
-ROUNDING_M = 1e-9
+ROUNDING_M = 1e-9  # distances may fall short by this, m
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +58,12 @@ class Space:
         """Distances that edges keep from the cores, (m,), m."""
         return np.asarray(self.keep + CHORDS * self.clearance)
 
-    def segments_are_free(self, begin: Array, end: Array) -> npt.NDArray[np.bool_]:
+    def segments_are_free(self, begin: Array, end: Array) -> Flags:
         """Which segments, from begin (K, 2), m, to end (K, 2), m, keep the distance from every obstacle."""
         # A segment that begins or ends too near to an obstacle is free if it comes no nearer in between.
         return convex.segments_are_free(begin, end, self.rows, self.along, ROUNDING_M)
 
-    def points_are_free(self, points: Array, clearance: float) -> npt.NDArray[np.bool_]:
+    def points_are_free(self, points: Array, clearance: float) -> Flags:
         """Which points (K, 2), m, keep every distance and this clearance, m."""
         return convex.points_are_free(points, self.rows, self.keep + (clearance - ROUNDING_M))
 
@@ -77,7 +76,7 @@ class RobotNodes:
     target: int  # node of its target
     preset: Indices  # nodes along the rest of its preset, (K,); the last is the target
     preset_times: Array  # times at these nodes, (K,), s
-    usable: npt.NDArray[np.bool_]  # which of these nodes keep every distance, (K,); no edge leads to the others
+    usable: Flags  # which of these nodes keep every distance, (K,); no edge leads to the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +242,7 @@ def _path_nodes(space: Space, path: Path, pitch: float) -> Array:
 
 
 @njit(cache=True)
-def _pairs(grid: Grid, number: Indices, radii: Array, partner: Indices, shut: npt.NDArray[np.bool_]) -> Indices:
+def _pairs(grid: Grid, number: Indices, radii: Array, partner: Indices, shut: Flags) -> Indices:
     """Pairs of nodes that may have an edge, each once, (E, 2)."""
     # number: of the nodes of the lattice by column and row, or -1; they have edges to their neighbours
     # radii: within which all other nodes have edges, (R,), m, but none to a `partner` or a node that is `shut`
@@ -294,7 +293,7 @@ def _fan(space: Space, start: Array, far: float) -> Array:
 
 
 @njit(cache=True)
-def _in_rows(points: Array, pairs: Indices, free: npt.NDArray[np.bool_]) -> tuple[Indices, Indices, Array]:
+def _in_rows(points: Array, pairs: Indices, free: Flags) -> tuple[Indices, Indices, Array]:
     """The free edges in both directions, sorted by tail and head: first edge of each node, heads, lengths."""
     first = np.zeros(len(points) + 1, np.int64)
     for k in range(len(pairs)):

@@ -10,10 +10,9 @@ import numpy as np
 from airground_drake.base.arrays import Array, Flags
 from airground_drake.uav.coordination import intervals
 from airground_drake.uav.coordination.intervals import Indices
-from airground_drake.uav.coordination.roadmap import Roadmap, RobotNodes, RobotTask, Space
+from airground_drake.uav.coordination.roadmap import ROUNDING_M, Roadmap, RobotNodes, RobotTask, Space
 from airground_drake.uav.coordination.timed import distance, free_pieces, timed, without_repeats
 
-ROUNDING_M = 1e-9  # distances between robots may fall short by this, m
 # A mover stores what so many motions block, to limit memory; more if there are more other robots, since every search
 # goes through the motions of all of them.
 MOST_KNOWN = 16

@@ -5,11 +5,11 @@ place. Functions are compiled by numba without fast-math: results are those of I
 """
 
 import numpy as np
-import numpy.typing as npt
 
-from airground_drake.base.arrays import Array
+from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry.convex import passes
+from airground_drake.uav.coordination.intervals import Indices
 
 
 def timed(times: Array, places: Array) -> Array:
@@ -97,7 +97,7 @@ def closest(one: Array, other: Array, begin: float, end: float) -> float:
 
 
 @njit(cache=True)
-def free_pieces(preset: Array, other: Array, apart: float) -> npt.NDArray[np.bool_]:
+def free_pieces(preset: Array, other: Array, apart: float) -> Flags:
     """Which pieces between the rows of a timed motion (K, 3) stay `apart`, m, from another motion; (K - 1,)."""
     free = np.empty(len(preset) - 1, np.bool_)
     for k in range(len(free)):
@@ -107,7 +107,7 @@ def free_pieces(preset: Array, other: Array, apart: float) -> npt.NDArray[np.boo
 
 @njit(cache=True)
 def straight_is_free(
-    motion: Array, i: int, j: int, rows: Array, keep: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
+    motion: Array, i: int, j: int, rows: Array, keep: Array, others: Array, begins: Indices, apart: Array
 ) -> bool:
     # It keeps the allowed distances. Where one of the two rows is nearer, it comes no nearer than that row.
     # motion: (M, 3); rows: (m, W); keep: (m,), m; others: (R, 3); begins: (B + 1,); apart: (B,), m
@@ -131,7 +131,7 @@ def straight_is_free(
 
 @njit(cache=True)
 def straightened(
-    motion: Array, upto: int, rows: Array, keep: Array, others: Array, begins: npt.NDArray[np.int64], apart: Array
+    motion: Array, upto: int, rows: Array, keep: Array, others: Array, begins: Indices, apart: Array
 ) -> Array:
     """The timed motion without needless detours between its first `upto` rows."""
     # From each row that is kept the motion goes straight, at constant speed, to a later row. The function tries the
