@@ -31,14 +31,13 @@ class Steps(NamedTuple):
     status: Status  # whether steps were found, and if not, whether all configurations were tried
     moves: Indices  # edge of each robot in each step, (T, n); T = 0 without a plan
     candidates: int  # what it cost
-    successors: int  # how many joint steps were asked for
 
 
 def search(graph: CoarseGraph, team: Team, starts: Indices, candidates: int, turn: int = 0) -> Steps:
     """Look for joint steps from the nodes `starts` (n,) to the targets."""
     most = int(min(MOST_CONFIGURATIONS, candidates // len(starts) + 2))
-    status, moves, spent, successors = _search(graph, team, starts, candidates, most, turn)
-    return Steps(_STATUS[status], moves, int(spent), int(successors))
+    status, moves, spent = _search(graph, team, starts, candidates, most, turn)
+    return Steps(_STATUS[status], moves, int(spent))
 
 
 @njit(cache=True)
@@ -122,8 +121,8 @@ def _successor(graph: CoarseGraph, team: Team, step: Step, order: Indices, digit
 @njit(cache=True)
 def _search(
     graph: CoarseGraph, team: Team, starts: Indices, budget: int, most: int, turn: int
-) -> tuple[int, Indices, int, int]:
-    """The compiled part of `search`; returns the index of the status, moves, candidates and successors."""
+) -> tuple[int, Indices, int]:
+    """The compiled part of `search`; returns the index of the status, moves and candidates."""
     count, last_layer = len(starts), len(team.to_go) - 1
     first, heads, targets, to_go = graph.first, graph.heads, team.targets, team.to_go
     nodes, moves = np.empty((most, count), np.int64), np.empty((most, count), np.int64)
@@ -138,7 +137,7 @@ def _search(
     far = 1.0
     for i in range(count):
         if to_go[0, i, starts[i]] == np.inf:
-            return 1, moves[:0], 0, 0
+            return 1, moves[:0], 0
         far = max(far, to_go[0, i, starts[i]])
     for i in range(count):
         priorities[0, i] = 0.9 * to_go[0, i, starts[i]] / far
@@ -196,7 +195,7 @@ def _search(
         stack.append(many)
         many += 1
     if goal < 0:
-        return (1 if len(stack) == 0 else 2), moves[:0], spent, successors
+        return (1 if len(stack) == 0 else 2), moves[:0], spent
     length, k = 0, goal
     while before[k] >= 0:
         length, k = length + 1, before[k]
@@ -205,4 +204,4 @@ def _search(
     for row in range(length - 1, -1, -1):
         path[row] = moves[k]
         k = before[k]
-    return 0, path, spent, successors
+    return 0, path, spent

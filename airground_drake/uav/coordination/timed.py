@@ -22,9 +22,9 @@ def at_rest(place: Array) -> Array:
     return timed(np.zeros(1), np.asarray(place, dtype=np.float64)[None])
 
 
-def distance(one: Array, other: Array, begin: float = 0.0, end: float = np.inf) -> float:
-    """Least distance of two timed motions (M, 3) over [begin, end], s, in m."""
-    return float(closest(one, other, begin, end))
+def distance(one: Array, other: Array, begin: float = 0.0) -> float:
+    """Least distance of two timed motions (M, 3) from a time, s, on, in m."""
+    return float(closest(one, other, begin, np.inf))
 
 
 def speed(motion: Array) -> float:
@@ -50,12 +50,10 @@ def without_repeats(motion: Array) -> Array:
 
 
 @njit(cache=True)
-def approach(x: float, y: float, vx: float, vy: float, duration: float) -> float:
-    """Least distance from the origin, m, of a point at (x, y) moving with (vx, vy) for a duration, s."""
+def approach(x: float, y: float, vx: float, vy: float) -> float:
+    """Least distance from the origin, m, of a point that goes straight from (x, y), m, by (vx, vy), m."""
     squared = vx * vx + vy * vy
-    s = 0.0
-    if squared > 0.0 and duration > 0.0:
-        s = min(max(-(x * vx + y * vy) / squared, 0.0), duration)
+    s = min(max(-(x * vx + y * vy) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
     return float(np.hypot(x + s * vx, y + s * vy))
 
 
@@ -91,7 +89,7 @@ def closest(one: Array, other: Array, begin: float, end: float) -> float:
         cx, cy, i = place(one, until, i)
         dx, dy, j = place(other, until, j)
         x, y = ax - bx, ay - by
-        least = min(least, approach(x, y, (cx - dx) - x, (cy - dy) - y, 1.0))
+        least = min(least, approach(x, y, (cx - dx) - x, (cy - dy) - y))
         ax, ay, bx, by, t = cx, cy, dx, dy, until
     return least
 
