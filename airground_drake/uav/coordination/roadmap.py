@@ -15,7 +15,7 @@ from airground_drake.base.arrays import Array, Flags
 from airground_drake.base.compiling import njit
 from airground_drake.model.geometry import convex, outline
 from airground_drake.model.geometry.paths import NoPath, Path, shortest_path
-from airground_drake.uav.coordination.intervals import Grid, Indices
+from airground_drake.uav.coordination.intervals import Grid, Indices, cells_between, nodes_near
 
 PITCH = 0.2  # spacing of the lattice as a share of the distance that robots keep
 REACH = 1.75  # nodes outside the lattice are connected to all nodes within this many spacings
@@ -148,7 +148,7 @@ def build_roadmap(spaces: Sequence[Space], tasks: Sequence[RobotTask], others: S
         shut[robot.preset[~robot.usable]] = True
         if np.hypot(*(points[robot.start] - points[robot.target])) > ROUNDING_M:
             partner[ends] = ends[::-1]
-    grid = _grid(points, low, reach)
+    grid = _grid(points, reach)
     pairs = _pairs(grid, number, radii, partner, shut)
     free = space.segments_are_free(points[pairs[:, 0]], points[pairs[:, 1]])
     first, heads, lengths = _in_rows(points, pairs, free)
@@ -258,11 +258,9 @@ def _pairs(grid: Grid, number: Indices, radii: Array, partner: Indices, shut: Fl
     others = len(nodes) - len(radii)
     for node in range(others, len(nodes)):
         x, y, radius = nodes[node, 0], nodes[node, 1], radii[node - others]
-        left, right = _cells(x - radius, x + radius, grid, 0)
-        bottom, top = _cells(y - radius, y + radius, grid, 1)
-        for column in range(left, right + 1):
-            begin, end = column * grid.shape[1] + bottom, column * grid.shape[1] + top + 1
-            for near in grid.members[grid.first[begin] : grid.first[end]]:
+        left, right = cells_between(x - radius, x + radius, grid.corner[0], grid.size, grid.shape[0])
+        for column in range(left, right):
+            for near in nodes_near(grid, column, y - radius, y + radius):
                 dx, dy = nodes[near, 0] - x, nodes[near, 1] - y
                 squared = dx * dx + dy * dy
                 if squared > radius * radius or near == node or shut[near] or shut[node] or partner[near] == node:
@@ -274,14 +272,6 @@ def _pairs(grid: Grid, number: Indices, radii: Array, partner: Indices, shut: Fl
                 pairs[count, 0], pairs[count, 1] = near, node
                 count += 1
     return pairs[:count]
-
-
-@njit(cache=True)
-def _cells(low: float, high: float, grid: Grid, axis: int) -> tuple[int, int]:
-    """First and last cell of an axis with nodes between two coordinates, m; `_grid` has no cells beyond its corner."""
-    most = grid.shape[axis] - 1
-    first, last = np.floor((low - grid.corner[axis]) / grid.size), np.floor((high - grid.corner[axis]) / grid.size)
-    return min(max(int(first), 0), most), min(max(int(last), 0), most)
 
 
 def _fan(space: Space, start: Array, far: float) -> Array:
@@ -319,9 +309,10 @@ def _in_rows(points: Array, pairs: Indices, free: Flags) -> tuple[Indices, Indic
     return first, heads, lengths
 
 
-def _grid(points: Array, low: Array, size: float) -> Grid:
-    """A grid over the nodes (N, 2), m, with its lowest corner, (2,), m, and the size of a cell, m."""
-    at = np.maximum(np.floor((points - low) / size).astype(np.int64), 0)
+def _grid(points: Array, size: float) -> Grid:
+    """A grid over the nodes (N, 2), m, with cells of a size, m."""
+    low = points.min(axis=0)
+    at = np.floor((points - low) / size).astype(np.int64)
     shape = at.max(axis=0) + 1
     cell = at[:, 0] * shape[1] + at[:, 1]
     members = np.argsort(cell, kind="stable").astype(np.int64)

@@ -199,6 +199,16 @@ def test_a_way_is_found_if_the_robot_can_be_back_in_time(seed: int, count: int, 
         assert find(movers[0], others, 5.0, spent - 1)[1] <= spent - 1
 
 
+def test_nodes_beyond_the_lattice_are_blocked_too() -> None:
+    """Where ways are long, the nodes round a start reach beyond the lattice; and a robot comes from farther out."""
+    roadmap = build_roadmap([space()], [task((0.0, 0.0), (2000.0, 2000.0))])
+    nodes = roadmap.nodes
+    for place in 2.0 * nodes[nodes.argmin(axis=0)]:  # as far beyond the lowest nodes as these are from the start
+        blocked, _ = intervals.blocked_times(np.array([[0.0, *place]]), roadmap.grid, np.full(len(nodes), 10.0))
+        assert len(blocked) > 0
+        assert blocked.tolist() == np.flatnonzero(np.hypot(*(nodes - place).T) < 10.0).tolist()
+
+
 def test_a_robot_that_leaves_is_not_taken_for_one_that_stays() -> None:
     """It stands on the target of another one."""
     one = task((-4.0, 0.0), (4.0, 0.0))
