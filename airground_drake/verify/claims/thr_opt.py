@@ -8,8 +8,11 @@ from airground_drake.model.trigger.bayes import bayes_risk
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.claims.thr_root import ThrRoot, as_floats, rule_of, two_signs
 from airground_drake.verify.engines.signs import RootInterval, ThresholdRule, ball, enclose, sign, value
+from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
+
+PRINTED = "Threshold.printed_is_worse"
 
 
 class ThrOpt(TheoremClaim):
@@ -17,12 +20,12 @@ class ThrOpt(TheoremClaim):
     summary = "The threshold of least Bayes risk is the root of the corrected equation, not of the printed one."
     statement = (
         "Without initial deviation the root of the threshold equation is the only minimiser of the Bayes risk over all "
-        "zeta; the root of the printed equation has a higher risk. With any initial deviation smaller than the root, "
-        "the risk is lower at some other threshold."
+        "zeta; the root of the printed equation has a higher risk, unless c1 = c2: then it is the same root. With any "
+        "initial deviation smaller than the root, the risk is lower at some other threshold."
     )
     latex = (
         r"B(\zeta) > B(\zeta_{\text{root}}) \text{ for every } \zeta \ne \zeta_{\text{root}}, \quad "
-        r"B(\zeta_{\text{printed}}) > B(\zeta_{\text{root}})",
+        r"c_1 \ne c_2 \; \Rightarrow \; B(\zeta_{\text{printed}}) > B(\zeta_{\text{root}})",
         r"0 < |y_0| < \zeta_{\text{root}} \; \Rightarrow \; B(\zeta, y_0) < B(\zeta_{\text{root}}, y_0) "
         r"\text{ for some } \zeta",
     )
@@ -38,12 +41,12 @@ class ThrOpt(TheoremClaim):
     )
     does_not_establish = (
         "That minimising this risk is the right aim, that c1, c2, drift and noise are well chosen, or which threshold "
-        "minimises the risk with an initial deviation. For c1 = c2 the printed equation has the same root."
+        "minimises the risk with an initial deviation."
     )
 
-    theorems = (
+    theorems: tuple[str, ...] = (
         "Threshold.least",
-        "Threshold.printed_is_worse",
+        PRINTED,
         "Threshold.not_least_with_deviation",
         "Threshold.at_most_two_drifts",
     )
@@ -51,6 +54,13 @@ class ThrOpt(TheoremClaim):
 
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         return ThrRoot().inputs(scenario)
+
+    def check(self, inputs: dict[str, Any]) -> Finding:
+        """Check the hypotheses; the theorem about the printed equation needs c1 and c2 that differ."""
+        claim, rule = ThrOpt(), rule_of(inputs)
+        if rule.c1 == rule.c2:
+            claim.theorems = tuple(name for name in self.theorems if name != PRINTED)
+        return TheoremClaim.check(claim, inputs)
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         rule = rule_of(inputs)

@@ -1,8 +1,8 @@
 """Reads an exported Coq file back and compares it with the run.
 
 Coq cannot see whether the numbers in the file are the recorded ones. This module takes the file apart by its own
-patterns. From the exporter it uses only `demands`, the required distances. Corners are compared with the shapes of the
-scenario.
+patterns. From the exporter it uses only the required distances, `demands`, and how far bodies may be off the straight
+lines, `off_m`. Corners are compared with the shapes of the scenario.
 """
 
 import re

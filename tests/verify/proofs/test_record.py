@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from airground_drake.base.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.verify.claim import Claim
 from airground_drake.verify.proofs import THEOREMS, runs, standing
+from airground_drake.verify.proofs.coq import CoqError
 from airground_drake.verify.proofs.record import FOLDER, file_of, read_record
 
 
@@ -38,6 +40,16 @@ def test_a_changed_theory_and_what_builds_on_it_are_not_checked(copy: Path) -> N
     for name in ("Safety.safe_always", "Gate.scaled_back", "LawChecker.sound"):
         assert (standing(name, folder=copy).checked, standing(name, folder=copy).words) == (False, wanted)
     assert standing("Trigger.dwell_apart", "Threshold.least", folder=copy).checked
+
+
+def test_runs_are_proved_with_the_theories_of_the_record_only(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a changed Run.v, say, every position could be far from all others."""
+    with (copy / "Run.v").open("a", encoding="utf-8") as file:
+        file.write("(* another word *)\n")
+    monkeypatch.setattr(runs, "standing", partial(standing, folder=copy))
+    wanted = r"the theories are not checked: Run\.v differs from its record: run `airground prove`"
+    with pytest.raises(CoqError, match=wanted), runs.workshop():
+        pass
 
 
 def _with(change: Callable[[dict[str, dict[str, object]]], object]) -> Callable[[Path], None]:

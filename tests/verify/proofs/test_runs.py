@@ -306,6 +306,19 @@ def test_the_command_proves_a_report_and_writes_down_what_it_found(
     said = capsys.readouterr().out
     assert f"run d: all 12 distances kept at all times: not proved: {REFUSED}" in said
     assert sorted(path.name for path in (made / "proofs").iterdir()) == ["proofs.json", "run_d.v", "run_d_law.v"]
+    found = json.loads((made / "proofs" / "proofs.json").read_text(encoding="utf-8"))
+    _forged_distances_are_found(made, found)
+
+
+def _forged_distances_are_found(made: Path, found: dict[str, Any]) -> None:
+    """Of a run that Coq refused, too: the page shows how near which pairs came."""
+    traces = {"d": trace.load(made / "trace" / "d")}
+    assert broken_rules(made / "proofs", traces)[1] == []
+    near = found["runs"]["d"]["distances"]["too_near"]
+    for forged in ([], near[:-1], [{**near[0], "least_m": 1.9}, *near[1:]], [{**near[0], "t_s": 9.0}, *near[1:]]):
+        found["runs"]["d"]["distances"]["too_near"] = forged
+        (made / "proofs" / "proofs.json").write_text(json.dumps(found), encoding="utf-8")
+        assert len(broken_rules(made / "proofs", traces)[1]) == 1, forged
 
 
 def test_what_cannot_be_proved_for_want_of_coq_or_of_files_is_said(

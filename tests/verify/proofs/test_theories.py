@@ -33,6 +33,8 @@ def test_what_differs_from_the_record_is_named(tmp_path: Path) -> None:
         "#[bypass_check(guard)] Fixpoint f (n : nat) : False := f n.",
         "Unset Guard Checking.",
         "Set Type In Type.",
+        '(* " (* " *) Axiom so : False.',
+        'Definition a := "(*". Axiom so : False. Definition b := "*)".',
     ],
 )
 def test_words_that_assume_something_are_refused(cheat: str) -> None:
@@ -52,6 +54,13 @@ def test_what_is_assumed_in_other_words_is_found_among_the_axioms(coq_version: s
         coq.check_again(["so"], tmp_path)
     coq.check_again(["fine"], tmp_path)
     assert coq.axioms_of(["fine.fine"], tmp_path) == {"fine.fine": []}
+
+
+def test_an_axiom_with_the_name_of_an_allowed_one_is_found(coq_version: str, tmp_path: Path) -> None:
+    (tmp_path / "so.v").write_text("Module Classical_Prop.\nVariable classic : False.\nEnd Classical_Prop.\n")
+    coq.compile_file(tmp_path / "so.v")
+    with pytest.raises(coq.CoqError, match=r"coqchk finds the axiom so\.Classical_Prop\.classic, which is not allowed"):
+        coq.check_again(["so"], tmp_path)
 
 
 WRONG = [

@@ -39,6 +39,7 @@ def test_root_and_optimum_are_proved_and_agree_with_mpmath_and_a_grid(name: str)
     worse = bayes_risk(enclosures["printed_zeta_m"][0], *constants) - bayes_risk(enclosures["zeta_m"][0], *constants)
     assert optimum.margin == pytest.approx(worse, rel=1e-6)
     assert (optimum.margin == 0.0) == (name == "equal costs")
+    assert ("Threshold.printed_is_worse" in optimum.evidence["theorems"]) == (name != "equal costs")
 
 
 def test_inputs_name_the_threshold_in_force(case_a: Scenario) -> None:
