@@ -10,7 +10,7 @@ from airground_drake.base.registry import AS_TOLD, METHODS
 from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
 from airground_drake.report.model import Approach, Claim, OnTheWay, Report
-from airground_drake.report.outcomes import named
+from airground_drake.report.sentences import named
 from airground_drake.sim.collisions import first_collisions
 
 # Stands for a claim that was not judged.
