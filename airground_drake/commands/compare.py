@@ -18,10 +18,7 @@ if TYPE_CHECKING:
     from airground_drake.report.model import Report
 
 EXIT_WORSE = 1
-PARTS = (
-    "inputs", "overall", "verdicts", "seeds", "margins", "exercised", "expectations", "reproduction", "audit", "events",
-    "metrics",
-)  # fmt: skip
+PARTS = tuple(compare.PARTS)
 MOST_LINES, MOST_ROWS = 20, 200  # changes of one part that are shown, in the terminal and on the page; `--json` has all
 _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
