@@ -31,7 +31,6 @@ AUDIT_DESCRIPTION = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    # Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error.
     options = parser().parse_args(arguments)
     if options.scenario is None and not options.list:
         parser().error("a scenario is needed (see --list)")

@@ -287,8 +287,8 @@ class Report(Entry):
     choices: list[Json]
     audit: list[Finding]
 
-    def about(self, *names: str) -> list[Claim]:
-        return [claim for claim in self.claims if claim.id in names]
+    def about(self, name: str) -> list[Claim]:
+        return [claim for claim in self.claims if claim.id == name]
 
 
 def of(document: Any, source: str = "report.json") -> Report:
