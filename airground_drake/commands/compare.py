@@ -38,7 +38,7 @@ def parser() -> Parser:
         "verdicts from the best to the worst: "
         + "; ".join(map(", ".join, compare.ORDER)).replace("exercised", "tested").replace("_", " ")
         + ". A verdict that is no longer the expected one is worse, too; so is a run with another seed that no longer "
-        "keeps distances or brings all UGVs home. Exit codes: 0 nothing got worse, 1 "
+        "keeps distances or brings all robots home. Exit codes: 0 nothing got worse, 1 "
         "something did (with --exact: any result differs), 2 usage, or a folder is not a report.",
     )
 

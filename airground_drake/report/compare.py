@@ -2,8 +2,8 @@
 
 A verdict is worse if it stands further down in `ORDER` than before, if it was as expected and no longer is, or if it
 is gone. A row of the reproduction table is worse by `ROWS`, a finding about the paper if it is no longer demonstrated,
-and a run with another seed if it no longer keeps distances or brings all UGVs home. Numbers are compared to the last
-digit.
+and a run with another seed if it no longer keeps distances or brings all robots home. Numbers are compared to the
+last digit.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ WITHIN = 1e-8  # numbers agree to this times 1 plus their size: versions of nump
 
 VERSIONS = ("package", "drake", "python", "packages", "git")  # what the provenance says about the code
 NO_INPUTS = ("title", "description")  # keys of a scenario that nothing depends on
-KEPT = ("kept", "home")  # about a run with another seed: distances were kept, and all UGVs arrived
+KEPT = ("kept", "home")  # about a run with another seed: distances were kept, and all robots arrived
 # Of a run: compared by `_events`, or measured by the clock.
 _CLOCK: Any = {"wall_s": True, "realtime_factor": True, "gatekeeper": {"time_s": True, "late": True}}
 NOT_COMPARED: Any = {"events": True, "metrics": _CLOCK}
