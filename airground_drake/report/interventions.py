@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
@@ -30,7 +29,7 @@ def interventions(trace: Trace) -> list[dict[str, Any]]:
     return [_became(trace, proposal, numbers[proposal.ugv], answers.get(proposal.number, none)) for proposal in sent]
 
 
-def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: pd.DataFrame) -> dict[str, Any]:
+def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) -> dict[str, Any]:
     """The outcome of a proposal, from the proposals that its UGV executed (S,), and from decisions about it."""
     times = trace.sampled("t_s")
     during = np.flatnonzero(numbers == sent.number)
@@ -56,7 +55,7 @@ def _end(how: str, t_s: float, reason: str = "") -> dict[str, Any]:
     return {"how": how, "t_s": t_s, "reason": reason}
 
 
-def _unexecuted(trace: Trace, sent: ProposalRecord, answers: pd.DataFrame) -> dict[str, Any]:
+def _unexecuted(trace: Trace, sent: ProposalRecord, answers: Any) -> dict[str, Any]:
     """The end of a proposal that was never executed."""
     refused = answers[answers["decision"] == "refuse"]
     if len(refused):
@@ -70,7 +69,7 @@ def _unexecuted(trace: Trace, sent: ProposalRecord, answers: pd.DataFrame) -> di
     return _end("end of the run", float(trace.t[-1]))
 
 
-def _executed(trace: Trace, sent: ProposalRecord, answers: pd.DataFrame, ended_s: float | None) -> dict[str, Any]:
+def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float | None) -> dict[str, Any]:
     """The end of a proposal executed up to a time, s; None: to the end of the run."""
     if ended_s is None:
         return _end("end of the run", float(trace.t[-1]))
