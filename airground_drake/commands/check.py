@@ -70,7 +70,6 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    # Exit code: 0 all agree, 1 not all, 2 usage or no report, 3 not reproduced here, 4 a fault of the checker.
     try:
         options = parser().parse_args(arguments)
         with progress_bar(quiet=options.quiet) as progress:

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
     from airground_drake.report.model import Report
 
 EXIT_WORSE = 1
-PARTS = (
-    "inputs", "overall", "verdicts", "seeds", "margins", "exercised", "expectations", "reproduction", "audit", "events",
-    "metrics",
-)  # fmt: skip
+PARTS = tuple(compare.PARTS)
 MOST_LINES, MOST_ROWS = 20, 200  # changes of one part that are shown, in the terminal and on the page; `--json` has all
 _ABOUT = ("claim", "id", "run", "robot", "kind", "n")
 
@@ -41,7 +38,7 @@ def parser() -> Parser:
         "verdicts from the best to the worst: "
         + "; ".join(map(", ".join, compare.ORDER)).replace("exercised", "tested").replace("_", " ")
         + ". A verdict that is no longer the expected one is worse, too; so is a run with another seed that no longer "
-        "keeps distances or brings all UGVs home. Exit codes: 0 nothing got worse, 1 "
+        "keeps distances or brings all robots home. Exit codes: 0 nothing got worse, 1 "
         "something did (with --exact: any result differs), 2 usage, or a folder is not a report.",
     )
 

@@ -8,7 +8,7 @@ from airground_drake.base.usage import formats_of
 from airground_drake.commands.saved import outside_reports, runs_of, trace_of
 from airground_drake.scenario.options import Parser, option, parser_of
 
-# Copies of those of `export.figures`, which takes seconds to import.
+# The styles are those of `export.figures`, which takes seconds to import.
 FORMATS, STYLES = ("pdf", "png", "svg"), ("ieee", "thesis")
 
 

@@ -1,7 +1,5 @@
 """`python -m airground_drake.report case_a`: simulate all runs of a scenario, check the claims, write the report."""
 
-from __future__ import annotations
-
 from airground_drake.base import interruption
 
 if __name__ == "__main__":
@@ -11,24 +9,17 @@ import argparse
 import shlex
 import sys
 import webbrowser
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from airground_drake.base import errors
-from airground_drake.base.progress import Progress, progress_bar
+from airground_drake.base.progress import progress_bar
 from airground_drake.base.usage import EXIT_TOOL, formats_of, positive, refuse, whole
 from airground_drake.report import folder
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, GIB, Limits, estimate
 from airground_drake.scenario.options import Parser, option, parser_of
 from airground_drake.scenario.shipped import AUDIT, shipped
-
-if TYPE_CHECKING:  # slow to import
-    from airground_drake.scenario.schema import Scenario
-    from airground_drake.sim.trace import Trace
-    from airground_drake.verify import Verdict
 
 FORMATS = tuple(folder.PAGES)
 AUDITED = "case_a"  # `report audit` reports on this scenario, with every finding about the paper
@@ -40,7 +31,6 @@ AUDIT_DESCRIPTION = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    # Exit code: 0 all claims as expected, 1 a claim differs, 2 usage or bad scenario, 3 inconclusive, 4 tool error.
     options = parser().parse_args(arguments)
     if options.scenario is None and not options.list:
         parser().error("a scenario is needed (see --list)")
@@ -86,8 +76,7 @@ def _reported(options: argparse.Namespace, command: str) -> int:
         plugins.shown(options.show_policy_output),
         progress_bar(quiet=options.quiet, verbose=options.verbose) as progress,
     ):
-        findings = partial(_findings, progress, audited=audited)
-        wanted = make.Wanted(options.format, command, kept, findings, audited, limits, options.seeds)
+        wanted = make.Wanted(options.format, command, kept, audited, limits, options.seeds)
         made = make.write_report(scenario, output, wanted, progress)
     from airground_drake.report import attention, model, screen  # imported while the runs were simulated
 
@@ -104,17 +93,6 @@ def _reported(options: argparse.Namespace, command: str) -> int:
     if options.open and "html" in options.format:
         webbrowser.open((output / "report.html").resolve().as_uri())
     return overall.exit_code
-
-
-def _findings(
-    progress: Progress, scenario: Scenario, traces: Mapping[str, Trace], verdicts: Sequence[Verdict], *, audited: bool
-) -> list[dict[str, Any]]:
-    from airground_drake.report import audit
-
-    if not audited:
-        return audit.of_runs(scenario, traces)
-    progress.stage("auditing the paper")
-    return [*audit.of_runs(scenario, traces), *audit.whole(scenario, verdicts)]
 
 
 def parser() -> Parser:

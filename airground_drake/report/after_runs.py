@@ -10,7 +10,7 @@ from typing import Any
 from airground_drake.base import files
 from airground_drake.base.parallel import processes
 from airground_drake.base.progress import Progress
-from airground_drake.report import document, folder, junit, metrics, model
+from airground_drake.report import audit, document, folder, junit, metrics, model
 from airground_drake.report.figures.draw import draw
 from airground_drake.report.folder import PAGES
 from airground_drake.report.html import page
@@ -20,7 +20,7 @@ from airground_drake.sim import graphviz, trace
 from airground_drake.sim.diagram import build_diagram, method_drawn
 from airground_drake.sim.runs import simulate_seeds
 from airground_drake.sim.trace import Trace
-from airground_drake.verify import Verdict, judge_all
+from airground_drake.verify import judge_all
 from airground_drake.verify.registry import model_claims
 
 PACKAGES = ("airground_drake", "drake", "numpy", "scipy", "numba", "pandas", "matplotlib", "daqp")
@@ -45,7 +45,6 @@ def finish(
     *,
     kept: Path | None,
     seeds: int,
-    audit: Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]] | None,
     audited: bool,
 ) -> dict[str, Any]:
     """Judge and draw the runs, write the folder, and return the document; arguments as of `make.Wanted`."""
@@ -53,7 +52,10 @@ def finish(
     with processes(1) as another:
         drawn = another.submit(draw, scenario, traces) if "html" in formats else None
         verdicts = judge_all(scenario, traces.values(), kept=kept, progress=progress)
-        findings = audit(scenario, traces, verdicts) if audit else ()
+        findings = audit.of_runs(scenario, traces)
+        if audited:
+            progress.stage("auditing the paper")
+            findings += audit.whole(scenario, verdicts)
         figures = drawn.result() if drawn else ()
     progress.stage("writing")
     origin = provenance()

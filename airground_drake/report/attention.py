@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 from airground_drake.base.errors import one_line
 from airground_drake.base.statuses import PASSING, UNDECIDED, outcome
 from airground_drake.report.model import Claim, Report, Run
-from airground_drake.report.outcomes import distance, named
-from airground_drake.report.sentences import MAX_NAMES, counted, grouped, joined, some
+from airground_drake.report.sentences import MAX_NAMES, counted, distance, grouped, joined, named, some
 from airground_drake.scenario.validate import preset_s
 from airground_drake.ugv.reasons import refusal
 

@@ -2,14 +2,15 @@
 
 A verdict is worse if it stands further down in `ORDER` than before, if it was as expected and no longer is, or if it
 is gone. A row of the reproduction table is worse by `ROWS`, a finding about the paper if it is no longer demonstrated,
-and a run with another seed if it no longer keeps distances or brings all UGVs home. Numbers are compared to the last
-digit.
+and a run with another seed if it no longer keeps distances or brings all robots home. Numbers are compared to the
+last digit.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -31,7 +32,7 @@ WITHIN = 1e-8  # numbers agree to this times 1 plus their size: versions of nump
 
 VERSIONS = ("package", "drake", "python", "packages", "git")  # what the provenance says about the code
 NO_INPUTS = ("title", "description")  # keys of a scenario that nothing depends on
-KEPT = ("kept", "home")  # about a run with another seed: distances were kept, and all UGVs arrived
+KEPT = ("kept", "home")  # about a run with another seed: distances were kept, and all robots arrived
 # Of a run: compared by `_events`, or measured by the clock.
 _CLOCK: Any = {"wall_s": True, "realtime_factor": True, "gatekeeper": {"time_s": True, "late": True}}
 NOT_COMPARED: Any = {"events": True, "metrics": _CLOCK}
@@ -41,24 +42,11 @@ E = TypeVar("E", bound="Entry")
 
 
 def compared(before: Report, after: Report) -> dict[str, Any]:
-    # Returns strict JSON: `regressions`, a count; lists of changes `inputs`, `overall` (one at most), `verdicts`,
-    # `seeds`, `margins`, `exercised`, `expectations`, `reproduction`, `audit`, `events`, `metrics`. A change has
-    # `before` and `after` (None if missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or
-    # `run`, `robot`, `kind` and `n`, the number of the event among those of its kind, from 1. Margins have their
-    # `relative` change.
-    changes_of: dict[str, Any] = {
-        "inputs": list(_inputs(before, after)),
-        "overall": list(_overall(before, after)),
-        "verdicts": list(_verdicts(before, after)),
-        "seeds": list(_seeds(before, after)),
-        "margins": [{**change, "relative": _relative(change)} for change in _of_claims(before, after, "margin")],
-        "exercised": list(_of_claims(before, after, "exercised")),
-        "expectations": list(_of_claims(before, after, "expected")),
-        "reproduction": list(_rows(before, after)),
-        "audit": list(_findings(before, after)),
-        "events": list(_events(before, after)),
-        "metrics": list(_metrics(before, after)),
-    }
+    # Returns strict JSON: `regressions`, a count; a list of changes for each of the `PARTS`. A change has `before` and
+    # `after` (None if missing), whether it is `worse`, and what it is about: `claim` and `run`; `id`; or `run`,
+    # `robot`, `kind` and `n`, the number of the event among those of its kind, from 1. Margins have their `relative`
+    # change.
+    changes_of = {part: list(changes_in(before, after)) for part, changes_in in PARTS.items()}
     for change in (changes := [change for part in changes_of.values() for change in part]):
         change.setdefault("worse", False)
     return {"regressions": sum(change["worse"] for change in changes), **changes_of}
@@ -159,8 +147,8 @@ def _of_claims(before: Report, after: Report, field: str) -> Iterator[Change]:
     for (claim, run), old, new in _paired(before.claims, after.claims, "id", "run"):
         was, now = getattr(old, field, None), getattr(new, field, None)
         if old and new and was != now:
-            unit = {"unit": new.unit} if field == "margin" else {}
-            yield {"claim": claim, "run": run, "before": was, "after": now, **unit}
+            of_margin = {"unit": new.unit, "relative": _relative(was, now)} if field == "margin" else {}
+            yield {"claim": claim, "run": run, "before": was, "after": now, **of_margin}
 
 
 def _rows(before: Report, after: Report) -> Iterator[Change]:
@@ -211,8 +199,23 @@ def _rank(order: Sequence[Sequence[str]], name: str) -> int:
     return [name in alike for alike in order].index(True)
 
 
-def _relative(change: Change) -> float | None:
+def _relative(was: float | None, now: float | None) -> float | None:
     """The change of a number relative to what it was; None if it was 0 or is gone."""
-    was, now = change["before"], change["after"]
     relative = (now - was) / abs(was) if was and now is not None else math.nan
     return relative if math.isfinite(relative) else None
+
+
+# The parts of a comparison, and what finds the changes in each of them; `overall` has one at most.
+PARTS: dict[str, Callable[[Report, Report], Iterator[Change]]] = {
+    "inputs": _inputs,
+    "overall": _overall,
+    "verdicts": _verdicts,
+    "seeds": _seeds,
+    "margins": partial(_of_claims, field="margin"),
+    "exercised": partial(_of_claims, field="exercised"),
+    "expectations": partial(_of_claims, field="expected"),
+    "reproduction": _rows,
+    "audit": _findings,
+    "events": _events,
+    "metrics": _metrics,
+}

@@ -78,8 +78,8 @@ def sealed(document: Mapping[str, Any], folder: Path, names: Iterable[str]) -> d
 def overall(
     claims: Sequence[Mapping[str, Any]],
     absent: Sequence[Mapping[str, Any]],
-    items: Sequence[Mapping[str, Any]] = (),
-    numbers: Sequence[Mapping[str, Any]] = (),
+    items: Sequence[Mapping[str, Any]],
+    numbers: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """The verdict over all claims, over findings about the paper and over expected numbers, as of `model.Overall`."""
     undemonstrated = [item["id"] for item in items if not item["demonstrated"]]

@@ -10,7 +10,7 @@ from airground_drake.base.registry import AS_TOLD, METHODS
 from airground_drake.base.statuses import PASSING
 from airground_drake.report import rules
 from airground_drake.report.model import Approach, Claim, OnTheWay, Report
-from airground_drake.report.outcomes import named
+from airground_drake.report.sentences import named
 from airground_drake.sim.collisions import first_collisions
 
 # Stands for a claim that was not judged.
@@ -36,8 +36,7 @@ class RunFacts:
         self._spec, self._metrics = self._scenario.runs[name], self.run.metrics
         about = sorted((claim for claim in report.claims if claim.run in ("", name)), key=lambda claim: claim.run)
         self._claims = {claim.id: claim for claim in about}
-        self.method = self._spec.method
-        method = METHODS.get(self.method)
+        method = METHODS.get(self._spec.method)
         self.is_helped = method is None or method.intervenes  # by the UAV; a method that is not ours may be
         self._obeys = method is not None and method.intervenes and not method.gated
         self.ugvs, self.uavs = [*self._scenario.ugvs], [*self._scenario.aerial]
@@ -70,7 +69,7 @@ class RunFacts:
         as_told = known and all(plant.kind == AS_TOLD for robot in robots for plant in robot.plant)
         needed = (*rules.PROOFS, *[rules.PROOF_OF_PLANTS][: not as_told])
         met = self.claim(rules.CONDITIONS).status in PASSING and self._spec.composition == "augmented"
-        return self.method == "d" and met and all(self.claim(name).status == "proved" for name in needed)
+        return self._spec.method == "d" and met and all(self.claim(name).status == "proved" for name in needed)
 
     @cached_property
     def breaches(self) -> list[Breach]:

@@ -85,12 +85,13 @@ CHIPS = {
 MAX_ROWS, MAX_COLUMNS, MAX_CELL_CHARS = 40, 10, 200  # maximum size of a table; report.json has all of it
 
 
-def render(report: Report, figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
-    # figures: as drawn by `figures.draw` and the like, in the order of the page.
+def page(report: Report, figures: Sequence[Figure], diagram_svg: str | None = None) -> str:
+    # figures: those of the runs, as drawn by `figures.draw`; charts of claims and of findings are added here.
     # diagram_svg: the block diagram; left out if it is no SVG or too large to inline.
+    every = [*figures, *_of_claims(report), *findings.draw([finding.model_dump() for finding in report.audit])]
     distances = [(name, pair) for name, run in report.runs.items() for pair in run.pairs()]
     distances.sort(key=lambda named: named[1].margin_m)
-    plates = grouped((figure.beside or PLACES.get(figure.id, "happened"), figure) for figure in figures)
+    plates = grouped((figure.beside or PLACES.get(figure.id, "happened"), figure) for figure in every)
     diagram = _diagram(diagram_svg, report.scenario.name)
     resting = grouped(dict.fromkeys((assumed, claim.id) for claim in report.claims for assumed in claim.assumptions))
     sections = {
@@ -224,11 +225,6 @@ def _together(members: Sequence[Claim]) -> list[tuple[Claim, str]]:
     alike = grouped(((_shown(claim), claim.as_expected or claim.expected), claim) for claim in members)
     names = [(those[0], [claim.run for claim in those if claim.run]) for those in alike.values()]
     return [(claim, f"all {runs}" if len(where) == runs > 1 else ", ".join(where)) for claim, where in names]
-
-
-def page(report: Report, figures: Sequence[Figure], diagram_svg: str | None) -> str:
-    of_audit = findings.draw([finding.model_dump() for finding in report.audit])
-    return render(report, [*figures, *_of_claims(report), *of_audit], diagram_svg)
 
 
 def _of_claims(report: Report) -> Iterator[Figure]:

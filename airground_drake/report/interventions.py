@@ -25,7 +25,8 @@ def interventions(trace: Trace) -> list[dict[str, Any]]:
         return []
     numbers = {ugv: trace.sampled(f"{ugv}.executing") for ugv in trace.ugvs}
     answers = dict(iter(trace.decisions.sort_values("t_s", kind="stable").groupby("number")))
-    return [_became(trace, proposal, numbers[proposal.ugv], answers.get(proposal.number)) for proposal in sent]
+    none = trace.decisions.iloc[:0]
+    return [_became(trace, proposal, numbers[proposal.ugv], answers.get(proposal.number, none)) for proposal in sent]
 
 
 def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) -> dict[str, Any]:
@@ -34,10 +35,9 @@ def _became(trace: Trace, sent: ProposalRecord, numbers: Array, answers: Any) ->
     during = np.flatnonzero(numbers == sent.number)
     begun_s = float(times[during[0]]) if during.size else None
     ended_s = float(times[during[-1] + 1]) if during.size and during[-1] + 1 < len(times) else None
-    yes = None if answers is None else answers[answers["decision"] == "accept"]
-    accepted = None if yes is None or not len(yes) else yes.iloc[0]
-    tries = -1 if accepted is None else int(accepted["tries"])
-    accepted_s = None if accepted is None else float(accepted["t_s"])
+    yes = answers[answers["decision"] == "accept"]
+    tries = int(yes["tries"].iloc[0]) if len(yes) else -1
+    accepted_s = float(yes["t_s"].iloc[0]) if len(yes) else None
     return {
         "number": sent.number,
         "robot": sent.ugv,
@@ -57,8 +57,8 @@ def _end(how: str, t_s: float, reason: str = "") -> dict[str, Any]:
 
 def _unexecuted(trace: Trace, sent: ProposalRecord, answers: Any) -> dict[str, Any]:
     """The end of a proposal that was never executed."""
-    refused = None if answers is None else answers[answers["decision"] == "refuse"]
-    if refused is not None and len(refused):
+    refused = answers[answers["decision"] == "refuse"]
+    if len(refused):
         return _end("refused", float(refused["t_s"].iloc[0]), str(refused["reason"].iloc[0]))
     about = trace.messages[trace.messages["about"] == sent.number]
     if len(about) and about.loc[about["kind"] == "proposal", "received_s"].isna().all():
@@ -73,11 +73,10 @@ def _executed(trace: Trace, sent: ProposalRecord, answers: Any, ended_s: float |
     """The end of a proposal executed up to a time, s; None: to the end of the run."""
     if ended_s is None:
         return _end("end of the run", float(trace.t[-1]))
-    if answers is not None:
-        refused = answers[(answers["decision"] == "refuse") & ((answers["t_s"] - ended_s).abs() <= TIME_TOLERANCE_S)]
-        reasons = [str(reason) for reason in refused["reason"]]
-        if reasons:
-            return _end("over" if reasons[0] == OVER else "given up", ended_s, reasons[0])
+    refused = answers[(answers["decision"] == "refuse") & ((answers["t_s"] - ended_s).abs() <= TIME_TOLERANCE_S)]
+    if len(refused):
+        reason = str(refused["reason"].iloc[0])
+        return _end("over" if reason == OVER else "given up", ended_s, reason)
     if ended_s >= sent.times_s[-1] - TIME_TOLERANCE_S:
         return _end("over", ended_s)
     later = (row.issued_s for row in proposals_of(trace) if row.ugv == sent.ugv and row.issued_s > sent.issued_s)

@@ -1,13 +1,11 @@
 """Making a report: simulate every run of a scenario, judge it, and write everything to a folder."""
 
-from __future__ import annotations
-
 import time
 from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 from airground_drake.base import files
 from airground_drake.base.progress import SILENT, Progress
@@ -16,18 +14,8 @@ from airground_drake.scenario.estimate import DEFAULT_LIMITS, Limits, within
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.runs import simulate_all
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from airground_drake.sim.trace import Trace
-    from airground_drake.verify import Verdict
-
 # Slow to import, and needed after the simulation: it is imported while the runs are simulated.
 _NEXT = "airground_drake.report.after_runs"
-
-
-# Makes findings about the paper from a scenario, its runs and the verdicts on them.
-Audit: TypeAlias = "Callable[[Scenario, Mapping[str, Trace], Sequence[Verdict]], Sequence[Mapping[str, Any]]]"
 
 
 class Wanted(NamedTuple):
@@ -36,8 +24,7 @@ class Wanted(NamedTuple):
     formats: tuple[str, ...] = tuple(folder.PAGES)  # of html, json and junit; traces and diagram are always written
     command: str = ""  # how to make this report again
     kept: Path | None = None  # folder of kept findings about the model, see `judge_model`; None: everything anew
-    audit: Audit | None = None  # makes the findings about the paper; None: the report has no findings
-    audited: bool = False  # whether these are all findings, so that each must be demonstrated
+    audited: bool = False  # whether to make all findings about the paper, of which each must then be demonstrated
     limits: Limits = DEFAULT_LIMITS  # what the scenario may ask for
     seeds: int = 0  # with how many seeds, from 1 on, distances and arrivals are counted; 0: none
 
@@ -82,5 +69,5 @@ def write_report(
 
         return after_runs.finish(
             scenario, traces, output, progress, wanted.formats, provenance,
-            kept=wanted.kept, seeds=wanted.seeds, audit=wanted.audit, audited=wanted.audited,
+            kept=wanted.kept, seeds=wanted.seeds, audited=wanted.audited,
         )  # fmt: skip

@@ -79,7 +79,7 @@ def came_near(trace: Trace) -> list[dict[str, Any]]:
     """The pair of least margin among those that came nearer than when both first existed."""
     # Two entries at most: of all pairs; and of those of an obstacle that may move, if that is another pair.
     pairs = pairs_of(trace)
-    bounds = apart_of(trace) - [pair.safe_m for pair in pairs_of(trace)]
+    bounds = apart_of(trace) - [pair.safe_m for pair in pairs]
     order = np.argsort(bounds, kind="stable").tolist()
     moving = [k for k in order if kind_of(trace.scenario, pairs[k].first, pairs[k].second) == MOVING]
     nearest = dict[Pair, dict[str, Any]]()
@@ -277,10 +277,6 @@ def gap_m(trace: Trace, robot: str, other: str) -> Array:
     """Distance of the surfaces of a robot and an obstacle or another robot at the rows, (T,), m."""
     # NaN before an obstacle appears.
     return gap_over_time(trace, pair_of(trace, robot, other))
-
-
-def radius_m(trace: Trace, name: str) -> float:
-    return trace.scenario.bodies[name].radius_m
 
 
 def _obstacles(trace: Trace) -> list[str]:

@@ -14,7 +14,7 @@ from airground_drake.base.errors import ReportError, short
 from airground_drake.base.statuses import NOT_EXERCISED, STATUSES, Status
 from airground_drake.base.values import RECORDED
 from airground_drake.report.folder import PAGES
-from airground_drake.report.outcomes import SLACK_M, distance, metres, named
+from airground_drake.report.sentences import SLACK_M, distance, metres, named
 from airground_drake.scenario.schema import Scenario
 
 SCHEMA = "airground_drake.report/4"
@@ -287,8 +287,8 @@ class Report(Entry):
     choices: list[Json]
     audit: list[Finding]
 
-    def about(self, *names: str) -> list[Claim]:
-        return [claim for claim in self.claims if claim.id in names]
+    def about(self, name: str) -> list[Claim]:
+        return [claim for claim in self.claims if claim.id == name]
 
 
 def of(document: Any, source: str = "report.json") -> Report:

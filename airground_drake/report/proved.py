@@ -15,8 +15,8 @@ from airground_drake.base import files
 from airground_drake.base.errors import ReportError
 from airground_drake.report.folder import PAGES
 from airground_drake.report.model import Claim
-from airground_drake.report.outcomes import distance
 from airground_drake.report.rules import DISTANCES
+from airground_drake.report.sentences import distance
 
 _PLACE = "<!--Coq on {run}-->{line}<!--end-->"
 _PLACES = re.compile(r"<!--Coq on (\w+)-->.*?<!--end-->", re.DOTALL)

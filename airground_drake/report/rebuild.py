@@ -34,13 +34,11 @@ _NUMBER = re.compile(r"(-?[0-9]+(?:\.[0-9]+)?)")
 Judge = Callable[[Any, Sequence[Any]], Sequence[Any]]  # from a scenario and its traces to verdicts, like `judge_all`
 
 
-def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
+def lines(folder: Path, judge: Judge) -> Iterator[Line]:
     """Make a report again and compare it: a line for each claim and each other part."""
-    # judge: judges the claims; default: `judge_all`, without its cache.
     from airground_drake.report.possible import impossible
     from airground_drake.scenario.load import from_data, own
     from airground_drake.sim import trace
-    from airground_drake.verify import judge_all
 
     report = json.loads(files.read_text(folder / "report.json"))
     scenario = from_data(report["scenario"]["resolved"], str(folder / "report.json"))
@@ -49,7 +47,7 @@ def lines(folder: Path, judge: Judge | None = None) -> Iterator[Line]:
     if wrong:
         yield from wrong
         return  # what is judged on such a run is not about the scenario
-    again = document_again(report, scenario, traces, judge or judge_all)
+    again = document_again(report, scenario, traces, judge)
     other_code = _other_code(report["provenance"])
     parts = [_with_note(line, other_code) for line in _parts(report, again, scenario)]
     yield from parts
@@ -119,12 +117,11 @@ def _expected(entry: Mapping[str, Any], scenario: Any) -> dict[str, Any]:
     return {**entry, "expected": expected, "as_expected": met}
 
 
-def _other_code(provenance: Any) -> str:
+def _other_code(provenance: Mapping[str, Any]) -> str:
     """A note if other code wrote the report: it may word or draw things otherwise; empty if this code wrote it."""
     from airground_drake.report.document import commit
 
-    about = provenance if isinstance(provenance, dict) else {}
-    written = (about.get("package"), about.get("git"))
+    written = (provenance.get("package"), provenance.get("git"))
     here = (version("airground_drake"), commit())
     if written == here:
         return ""

@@ -362,9 +362,7 @@ def declared(report: Report) -> Cell:
              f"{rules.CAME_OUT.get(claim.status, claim.status)}" for claim in wrong]  # fmt: skip
     names += [f"finding {number} about the paper not demonstrated" for number in overall.undemonstrated]
     if names:
-        lines.append(", ".join(names[:3]))
-    if len(names) > 3:
-        lines[-1] += f" and {len(names) - 3} more"
+        lines.append(some(names, 3))
     if more := len(overall.unpromised):
         lines.append(f"{counted(more, 'more check')}: nothing is promised")
     mark = {"as_expected": "yes", "not_as_expected": "no"}.get(overall.status, "open")

@@ -41,7 +41,7 @@ def page_file(scenario: Scenario, traces: dict[str, Trace], tmp_path_factory: py
         cut = [replace(panel, table=replace(panel.table, rows=panel.table.rows[:4])) for panel in figure.panels]
         figures[k] = replace(figure, panels=tuple(cut))
     path = tmp_path_factory.mktemp("page") / "report.html"
-    path.write_text(html.render(of(report), figures), "utf-8")
+    path.write_text(html.page(of(report), figures), "utf-8")
     return path
 
 

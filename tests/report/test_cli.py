@@ -3,12 +3,14 @@
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from report.cases import make_scenario
 
-from airground_drake.report import make, screen
+from airground_drake.report import after_runs, make, screen
 from airground_drake.report.__main__ import main
 from airground_drake.report.model import of
 from airground_drake.scenario.load import load, shipped
@@ -87,6 +89,18 @@ def test_a_folder_that_cannot_be_used_is_refused_before_the_work(
         assert main(["case_a", "-o", str(folder)]) == 2
         assert why in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_report_without_the_command_line_has_the_findings_of_its_runs_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`airground check` makes these findings again, and would not agree with a report that lacks them."""
+    monkeypatch.setattr(after_runs, "judge_all", lambda *_, **__: [])
+    scenario = make_scenario()
+    trigger = replace(scenario.reproduction[1], run="a")
+    stalling = replace(scenario, duration_s=12.0, runs={"a": scenario.runs["a"]}, reproduction=[trigger])
+    made = make.write_report(stalling, tmp_path, make.Wanted(("json",)))
+    assert [item["id"] for item in made["audit"]] == [6]
 
 
 def test_the_shipped_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,7 +16,6 @@ from airground_drake.base.statuses import STATUSES
 from airground_drake.report import attention, document, html, sentences
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
-from airground_drake.report.html import page as page_of
 from airground_drake.report.model import of
 from airground_drake.scenario.schema import Run, Scenario
 from airground_drake.sim.trace import Trace
@@ -70,7 +69,7 @@ def hostile_page() -> str:
     report = built(scenario, traces, [*FINE, Verdict.of(claim(), PLACEHOLDER, finding, "holds")])
     figures = draw.draw(scenario, traces)
     report["provenance"][HOSTILE] = report["provenance"]["command"] = HOSTILE
-    return page_of(spoilt(of(report)), figures, DIAGRAM)
+    return html.page(spoilt(of(report)), figures, DIAGRAM)
 
 
 def spoilt(value: Any) -> Any:
@@ -87,7 +86,7 @@ def spoilt(value: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def page(scenario: Scenario, traces: dict[str, Trace], drawn: list[Figure]) -> str:
-    return html.render(of(built(scenario, traces, FINE)), drawn, DIAGRAM)
+    return html.page(of(built(scenario, traces, FINE)), drawn, DIAGRAM)
 
 
 @pytest.fixture(params=["page", "hostile_page"])
@@ -157,7 +156,7 @@ def test_what_fails_is_shown_first_and_what_was_not_tested_apart(
     scenario: Scenario, traces: dict[str, Trace], page: str
 ) -> None:
     failed = verdict("c", "refuted", margin=-0.25, unit="m", where={"robot": "ugv1"}, counterexample={"t_s": 4.25})
-    text = html.render(of(built(scenario, traces, [failed, *FINE[1:], verdict("a", exercised=0)])), [])
+    text = html.page(of(built(scenario, traces, [failed, *FINE[1:], verdict("a", exercised=0)])), [])
     assert 'class="headline bad"' in text
     assert "c: distances failed" in first(text)
     told = text[text.index("What needs attention") : text.index('id="happened"')]
@@ -174,7 +173,7 @@ def test_a_chart_stands_beside_its_claim_or_where_the_rules_put_it(
     chart = Chart("Spare room", "t, s", "m", {"ugv1": ([0.0, 1.0], [2.0, 3.0])}, caption="All of it.")
     report = built(scenario, traces, [verdict("c", figure=chart), verdict("a")])
     report["claims"].append({**report["claims"][0], "id": "THR-CHOICE", "run": ""})
-    text = page_of(of(report), [], None)
+    text = html.page(of(report), [], None)
     headings = re.findall(r"<h[234]?(?: id=\"\w+\")?>([\w -]*(?:SAFE-TRACE|Spare room|step in|All checks)[^<]*)<", text)
     assert headings == ["When did the UAV step in?", "Spare room", "All checks", "SAFE-TRACE", "Spare room"]
     assert text.count("All of it.") == 2
@@ -183,9 +182,9 @@ def test_a_chart_stands_beside_its_claim_or_where_the_rules_put_it(
 
 def test_sections_that_would_say_nothing_are_absent(scenario: Scenario, traces: dict[str, Trace]) -> None:
     bare = replace(scenario, name="mine", reproduction=[], choices=[], runs={"a": scenario.runs["a"]})
-    text = html.render(of(built(bare, {"a": traces["a"]}, FINE[:1])), [])
+    text = html.page(of(built(bare, {"a": traces["a"]}, FINE[:1])), [])
     assert re.findall(r'<h2 id="(\w+)">', text) == ["happened", "safe", "claims", "provenance"]
-    empty = html.render(of(document.build(bare, {}, [], {})), [], "no svg")
+    empty = html.page(of(document.build(bare, {}, [], {})), [], "no svg")
     assert "With or without the UAV (a): not run." in first(empty)
     assert Page(empty).unbalanced == []
 
@@ -199,12 +198,12 @@ def test_the_reason_that_decided_is_shown_with_its_cost_and_so_is_a_failing_solv
         accept_throughout=[350.3, 340.0], refuse_throughout=468.8, issued_s=14.6,
     )  # fmt: skip
     report = built(scenario, {**traces, "c": replace(traces["c"], decisions=decisions)}, FINE)
-    text = " ".join(html.render(of(report), []).split())
+    text = " ".join(html.page(of(report), []).split())
     assert "refuse: the best plan refuses now and accepts later (cost 350 of the best plan, 350.3 to" in text
     assert "ugv1 refused 1 proposal because the best plan began by refusing and accepted later" in text
     assert "the solver failed 1 time," in text
     report["runs"]["c"]["metrics"]["gatekeeper"]["closest_call"] |= {"decision": "accept", "reason": "first_stage"}
-    assert "accept: the plan begins with this answer" in html.render(of(report), [])
+    assert "accept: the plan begins with this answer" in html.page(of(report), [])
 
 
 def test_faults_are_told_once_each_cut_and_without_what_turns_or_breaks_lines() -> None:

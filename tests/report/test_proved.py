@@ -40,7 +40,7 @@ def made(tmp_path: Path, scenario: Scenario, traces: dict[str, Trace]) -> Path:
         f"trace/{name}/{file}" for name, of in traces.items() for file in trace.save(of, folder / "trace" / name)
     ]
     found = built(scenario, traces, FINE)
-    files.write_text(folder / "report.html", html.render(of(found), ()))
+    files.write_text(folder / "report.html", html.page(of(found), ()))
     files.write_json(folder / "report.json", document.sealed(found, folder, [*written, "report.html"]))
     return folder
 

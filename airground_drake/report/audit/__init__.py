@@ -17,9 +17,8 @@ __all__ = ["of_runs", "whole"]
 def whole(scenario: Scenario, verdicts: Sequence[Verdict]) -> list[Item]:
     """All findings but those of the scenario's own runs."""
     from airground_drake.report.audit.companions import companion_findings  # imports Drake
-    from airground_drake.report.audit.formulas import formula_findings, reading_findings
+    from airground_drake.report.audit.formulas import formula_findings
     from airground_drake.report.audit.thresholds import threshold_findings
 
     proofs = {verdict.claim.id: verdict for verdict in verdicts if not verdict.run}
-    computed = [*threshold_findings(scenario, proofs), *formula_findings(scenario), *reading_findings(scenario)]
-    return [*computed, *companion_findings()]
+    return [*threshold_findings(scenario, proofs), *formula_findings(scenario), *companion_findings()]

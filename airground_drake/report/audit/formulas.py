@@ -18,7 +18,7 @@ from airground_drake.scenario.schema import Scenario
 
 
 def formula_findings(scenario: Scenario) -> list[Item]:
-    """Items 8 and 12 to 17; all are computed."""
+    """Items 8, 12 to 17 and 19 to 22."""
     return [
         _task_and_configuration(),
         _feed_forward(scenario),
@@ -27,6 +27,10 @@ def formula_findings(scenario: Scenario) -> list[Item]:
         _rule_three(),
         _null_space(),
         _one_speed(scenario),
+        _intervention_rate(scenario),
+        _stall(scenario),
+        _uav_target(scenario),
+        _indices(),
     ]
 
 
@@ -165,11 +169,6 @@ def _one_speed(scenario: Scenario) -> Item:
             "speed_if_it_begins_there_m_s": third, "speed_in_the_scenarios_m_s": here,
         },
     )  # fmt: skip
-
-
-def reading_findings(scenario: Scenario) -> list[Item]:
-    """Items 19 to 22."""
-    return [_intervention_rate(scenario), _stall(scenario), _uav_target(scenario), _indices()]
 
 
 def _intervention_rate(scenario: Scenario) -> Item:

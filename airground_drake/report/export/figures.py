@@ -11,12 +11,11 @@ from airground_drake.report import rules
 from airground_drake.report.figures import draw
 from airground_drake.report.figures.panels import Figure
 from airground_drake.report.model import Report
-from airground_drake.report.sentences import as_text
+from airground_drake.report.sentences import as_text, grouped
 from airground_drake.report.view import canvas
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 
-FORMATS = ("pdf", "png", "svg")
 # Settings of matplotlib by style: serif type for two columns, sans serif for one.
 STYLES: dict[str, dict[str, Any]] = {
     "ieee": {"font.family": "serif", "font.serif": ["STIXGeneral", "Times"], "mathtext.fontset": "stix"},
@@ -37,12 +36,7 @@ _SPECIAL = {
 
 
 def write(
-    report: Report,
-    scenario: Scenario,
-    traces: Mapping[str, Trace],
-    folder: Path,
-    style: str = "ieee",
-    formats: Sequence[str] = ("pdf",),
+    report: Report, scenario: Scenario, traces: Mapping[str, Trace], folder: Path, style: str, formats: Sequence[str]
 ) -> Iterator[Path]:
     """Write the figures of a report, `figures.tex` with their captions, `verdicts.tex` and `reproduction.tex`."""
     # folder: where the files go; it must exist.
@@ -84,12 +78,10 @@ def _environment(figure: Figure, names: Sequence[str], width: str, report: Repor
 def _established(claims: Sequence[str], report: Report) -> Iterator[str]:
     """A sentence per claim: proved, refuted, or the runs in which it holds."""
     for name in claims:
-        runs_by_status: dict[str, list[str]] = {}
-        for claim in report.claims:
-            status = outcome(claim.status, claim.exercised)
-            if claim.id == name and status in (*PASSING, "refuted"):
-                runs_by_status.setdefault(status, []).append(claim.run)
-        for status, runs in runs_by_status.items():
+        found = grouped((outcome(claim.status, claim.exercised), claim.run) for claim in report.about(name))
+        for status, runs in found.items():
+            if status not in (*PASSING, "refuted"):
+                continue
             noun = "runs" if len(runs) > 1 else "run"
             where = f" in {noun} {', '.join(runs)}" if any(runs) else ""
             yield f"{name} {status if status == 'holds' else f'is {status}'}{where}."

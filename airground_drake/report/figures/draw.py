@@ -14,7 +14,7 @@ from airground_drake.base.errors import TraceError
 from airground_drake.base.registry import method_of
 from airground_drake.report.figures import findings, maps, timelines
 from airground_drake.report.figures.panels import MAX_TABLE_ROWS, Figure, Panel, Table, panel, series
-from airground_drake.report.metrics import close_by, events_of, gap_m, radius_m
+from airground_drake.report.metrics import close_by, events_of, gap_m
 from airground_drake.report.reproduction import MEASURES
 from airground_drake.report.rules import SETTINGS
 from airground_drake.report.view import canvas
@@ -139,7 +139,7 @@ def _trajectories(chosen: _Selection) -> Figure:
     keys = {heading: maps.key_of(trace, chosen.team, frame) for heading, trace in chosen.shown.items()}
     lines = max(len(maps.lines_of(key)) for key in keys.values())
     has_walls = not all(body.is_round for body in barriers)
-    true_size = any(radius_m(first, name) > 0.0 for name in first.robots) or any(
+    true_size = any(robot.radius_m > 0.0 for robot in first.scenario.robots.values()) or any(
         body.is_round and body.radius_m[0] > 0.0 for body in barriers
     )
     kinds = ["Hexagon: obstacle"] if any(body.is_round for body in barriers) or not has_walls else []

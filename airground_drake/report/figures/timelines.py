@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from airground_drake.base.arrays import Array, Flags
 from airground_drake.report.metrics import events_of, gap_m
 from airground_drake.report.model import Approach
-from airground_drake.report.outcomes import metres
+from airground_drake.report.sentences import metres
 from airground_drake.report.view import canvas
 from airground_drake.report.view.canvas import ticks_of
 from airground_drake.report.view.labels import BOX

@@ -137,11 +137,11 @@ def interval(values: Array) -> tuple[float, float]:
     return low - max(missing, 0.0) / 2.0, high + max(missing, 0.0) / 2.0
 
 
-def time_line(axes: Axes, t: Array, values: Array, appearance: Look, **options: Any) -> None:
+def time_line(axes: Axes, t: Array, values: Array, appearance: Look) -> None:
     rows = thin(values)
     axes.plot(
         t[rows], values[rows], color=appearance.color, linestyle=appearance.dash, marker=appearance.marker,
-        markevery=max(1, len(rows) // 8), markersize=4.5, **options,
+        markevery=max(1, len(rows) // 8), markersize=4.5,
     )  # fmt: skip
 
 

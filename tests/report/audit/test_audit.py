@@ -27,11 +27,7 @@ COMPANIONS = (7, 10, 11, 23, 24, 25)
 
 def from_formulas(proofs: dict[str, Finding]) -> list[dict[str, Any]]:
     scenario = load("case_a")
-    return [
-        *thresholds.threshold_findings(scenario, proofs),
-        *formulas.formula_findings(scenario),
-        *formulas.reading_findings(scenario),
-    ]
+    return [*thresholds.threshold_findings(scenario, proofs), *formulas.formula_findings(scenario)]
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,14 @@
-"""An MCAP file, read by the reader of the format's own package."""
+"""An MCAP file, read by the reader of the format's own package, and CSV files, read back."""
 
 import io
 import json
 import sys
 from collections import defaultdict
+from pathlib import Path
 
 import jsonschema
+import numpy as np
+import pandas as pd
 import pytest
 from mcap.reader import make_reader
 from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
@@ -13,6 +16,7 @@ from report.cases import GOING_ROUND, SUCCESS, make_scenario, make_trace
 from airground_drake.base.errors import ExportError
 from airground_drake.report.export import recording
 from airground_drake.scenario.schema import Obstacle
+from airground_drake.sim.tables import TABLES
 
 
 def test_it_has_what_the_trace_has_as_its_schemas_say() -> None:
@@ -61,3 +65,15 @@ def test_without_the_package_one_line_says_what_to_install(monkeypatch: pytest.M
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     with pytest.raises(ExportError, match=r"pip install 'airground_drake\[mcap\]'"):
         recording.recorded(make_trace(make_scenario(), "c", GOING_ROUND, SUCCESS), make_scenario())
+
+
+def test_numbers_and_lists_read_back_equal(tmp_path: Path) -> None:
+    trace = make_trace(make_scenario(), "c", GOING_ROUND, SUCCESS)
+    written = list(recording.write(trace, tmp_path))
+    names = (*TABLES, "events", "distances")
+    assert [path.name for path in written] == [f"c_{name}.csv" for name in names]
+    for path, table in zip(written, (trace.states, trace.samples), strict=False):
+        pd.testing.assert_frame_equal(pd.read_csv(path, dtype=str).astype(float), table, check_exact=True)
+    events = pd.read_csv(written[-2])
+    places = [json.loads(cell) for cell in events["position_m"]]
+    assert np.array_equal(places, [event["position_m"] for event in trace.events])
