@@ -30,8 +30,9 @@ from airground_drake.base.values import Real, Words, refused, wanted
 from airground_drake.scenario import plugins
 from airground_drake.scenario.document import UNKNOWN_KEY, Document, read, suggestion
 from airground_drake.scenario.filled import filled
-from airground_drake.scenario.load import from_data, load, shipped
+from airground_drake.scenario.load import from_data, load
 from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.shipped import shipped
 from airground_drake.study.campaign.course import REPLACES, Course
 from airground_drake.study.campaign.distributions import GRID, HALTON, KINDS, Key, combinations, made, stream, values_of
 from airground_drake.study.campaign.rows import TIMES
