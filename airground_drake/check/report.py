@@ -39,6 +39,7 @@ OF_A_REPORT = re.compile(
 )
 OF_THE_MAP = "map/"  # folder of the files of the map
 ADDED_LATER = "proofs/"  # folder of the files that `airground prove` adds to a report
+LONGEST = 120  # characters of a value in a line
 
 
 def check_report(folder: Path, limit_s: float, told: Callable[[CheckLine], object] = bool) -> list[CheckLine]:
@@ -171,6 +172,6 @@ def _in_brackets(about: str) -> str:
     return f" ({about})" if about else ""
 
 
-def _short(value: Any, most: int = 120) -> str:
+def _short(value: Any) -> str:
     text = value if isinstance(value, str) else repr(value)
-    return text if len(text) <= most else f"{text[:most]}..."
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."

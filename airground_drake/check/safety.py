@@ -5,7 +5,7 @@ D >= d + V h, else n.v >= 0. It is the other inequality with d + V h in place of
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from math import isqrt
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from .plants import MOST_PARTS, STRAIGHT_M, Rows, least_radius_m, only_ahead, ow
 from .rules import SMALL, Array, Disagreement, Found, close, holds
 from .run import Run, column_of
 from .scenario import Pair, expected_m_s, has_own_views, written
-from .shapes import Away
+from .shapes import Away, Part, Shape
 
 FAR_M = 1e-6  # largest error of a distance in floating point, m; pairs that are farther apart need no exact arithmetic
 
@@ -180,44 +180,51 @@ def shortfalls_m(
     lasts: Sequence[Fraction] = (), seen_m: Array | None = None,
 ) -> dict[int, Shortfall]:  # fmt: skip
     """Violations of a pair's inequalities, by period, for the periods with a violation."""
-    # There is an inequality for each convex part of what is avoided; the largest shortfall counts. Samples at which the
-    # two cannot meet within a period, whatever their direction, need none.
+    # There is an inequality for each convex part of what is avoided; the largest shortfall counts.
     # own_m, other_m: (K + 1, 3); safe_m, gain: (K,)
     # lasts: divisors of the steps of each period, (K,); by default 1.
     # seen_m: where the robot was measured, (K, 3). Beside an obstacle that may move, one that is safe_m away as
     # measured, less the error, may meet the inequality of that place instead.
-    reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
-    lasts = lasts or [Fraction(1)] * len(reach)
-    reach /= np.array([float(last) for last in lasts])
-    enough = reach + np.asarray(safe_m) + FAR_M
+    lasts = lasts or [Fraction(1)] * (len(own_m) - 1)
     share, shortfalls = Fraction(pair.share), dict[int, Shortfall]()
+    for part, k in _near_periods(pair.shape, own_m, other_m, safe_m, lasts):
+        here, there, after, beyond = (
+            [Fraction(c) for c in place] for place in (own_m[k], other_m[k], own_m[k + 1], other_m[k + 1])
+        )
+        ways = part.away([a - b for a, b in zip(here, there, strict=True)])
+        given, step = (
+            (Fraction(safe_m[k]), share, gain[k], len(part.corners) == 1),
+            [a - b for a, b in zip(after, here, strict=True)],
+        )
+        own, other = min(_missed_m(away, [axis / lasts[k] for axis in step], *given) for away in ways), Fraction()
+        if seen_m is not None and own:
+            sure = Fraction(safe_m[k]) + Fraction(pair.error_m)
+            place = [Fraction(c) - b for c, b in zip(seen_m[k].tolist(), there, strict=True)]
+            for away in part.away(place):
+                if away.beyond >= sure * _root(sum((c * c for c in away.vector), Fraction()))[1]:
+                    own = min(own, _missed_m(away, [axis / lasts[k] for axis in step], sure, *given[1:]))
+        if pair.share < 1.0:  # a robot is a point: there is one way
+            step = [(a - b) / lasts[k] for a, b in zip(beyond, there, strict=True)]
+            other = _missed_m(Away([-c for c in ways[0].vector], ways[0].beyond), step, *given)
+        if own + other > (shortfalls[k].both if k in shortfalls else 0):
+            shortfalls[k] = Shortfall(own, other)
+    return shortfalls
+
+
+def _near_periods(
+    shape: Shape, own_m: Array, other_m: Array, safe_m: Sequence[float], lasts: Sequence[Fraction]
+) -> Iterator[tuple[Part, int]]:
+    """Convex parts, each with a period in which the two could meet, whatever their direction."""
+    # own_m, other_m: (K + 1, 3); safe_m, lasts: (K,)
+    reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
+    enough = reach / np.array([float(last) for last in lasts]) + np.asarray(safe_m) + FAR_M
     apart = own_m[:-1] - other_m[:-1]
-    for bound, part, rows in pair.shape.near(apart):
+    for bound, part, rows in shape.near(apart):
         if bound >= enough.max():
             break
         far = part.signed_m(apart[rows]) >= enough[rows]
         for k in (rows.start + np.flatnonzero(~far)).tolist():  # also where it is not a number
-            here, there, after, beyond = (
-                [Fraction(c) for c in place] for place in (own_m[k], other_m[k], own_m[k + 1], other_m[k + 1])
-            )
-            ways = part.away([a - b for a, b in zip(here, there, strict=True)])
-            given, step = (
-                (Fraction(safe_m[k]), share, gain[k], len(part.corners) == 1),
-                [a - b for a, b in zip(after, here, strict=True)],
-            )
-            own, other = min(_missed_m(away, [axis / lasts[k] for axis in step], *given) for away in ways), Fraction()
-            if seen_m is not None and own:
-                sure = Fraction(safe_m[k]) + Fraction(pair.error_m)
-                place = [Fraction(c) - b for c, b in zip(seen_m[k].tolist(), there, strict=True)]
-                for away in part.away(place):
-                    if away.beyond >= sure * _root(sum((c * c for c in away.vector), Fraction()))[1]:
-                        own = min(own, _missed_m(away, [axis / lasts[k] for axis in step], sure, *given[1:]))
-            if pair.share < 1.0:  # a robot is a point: there is one way
-                step = [(a - b) / lasts[k] for a, b in zip(beyond, there, strict=True)]
-                other = _missed_m(Away([-c for c in ways[0].vector], ways[0].beyond), step, *given)
-            if own + other > (shortfalls[k].both if k in shortfalls else 0):
-                shortfalls[k] = Shortfall(own, other)
-    return shortfalls
+            yield part, k
 
 
 def gain_of_pair(pair: Pair, gain: Fraction) -> Fraction:
@@ -235,21 +242,16 @@ def measured_shortfall_m(run: Run, law: Pair, rows: Rows, gain: Fraction, last: 
         (run.seen_m(law.robot, by) - (run.seen_m(law.other, by) if law.other in run.robots else 0.0))[samples]
         for by in measuring
     ]
-    apart, step = own_m[:-1] - other_m[:-1], np.diff(own_m, axis=0) - np.diff(other_m, axis=0)
-    lasts = [Fraction(1)] * (len(apart) - 1) + [last]
-    reach = np.linalg.norm(np.diff(own_m, axis=0), axis=1) + np.linalg.norm(np.diff(other_m, axis=0), axis=1)
-    enough, lacks = reach / np.array([float(length) for length in lasts]) + law.safe_m + FAR_M, Fraction()
-    for bound, part, near in law.shape.near(apart):
-        if bound >= enough.max():
-            break
-        far = part.signed_m(apart[near]) >= enough[near]
-        for k in (near.start + np.flatnonzero(~far)).tolist():  # also where it is not a number
-            if not reach[k]:
-                continue
-            gone = [Fraction(axis) / lasts[k] for axis in step[k].tolist()]
-            given = gone, Fraction(law.safe_m), Fraction(1), gain, len(part.corners) == 1
-            ways = [away for seen in views for away in part.away([Fraction(axis) for axis in seen[k].tolist()])]
-            lacks = max(lacks, min(_missed_m(away, *given) for away in ways))
+    own_step, other_step = np.diff(own_m, axis=0), np.diff(other_m, axis=0)
+    step, moves = own_step - other_step, own_step.any(axis=1) | other_step.any(axis=1)
+    lasts, lacks = [Fraction(1)] * (len(step) - 1) + [last], Fraction()
+    for part, k in _near_periods(law.shape, own_m, other_m, [law.safe_m] * len(step), lasts):
+        if not moves[k]:
+            continue
+        gone = [Fraction(axis) / lasts[k] for axis in step[k].tolist()]
+        given = gone, Fraction(law.safe_m), Fraction(1), gain, len(part.corners) == 1
+        ways = [away for seen in views for away in part.away([Fraction(axis) for axis in seen[k].tolist()])]
+        lacks = max(lacks, min(_missed_m(away, *given) for away in ways))
     return lacks
 
 

@@ -154,8 +154,7 @@ def _read_bytes(name_or_path: str) -> tuple[str, bytes]:
 
 
 def parsed(text: str, source: str, at: tuple[str, ...] = ()) -> Document:
-    """The data of YAML text, within the limits."""
-    # text: the text. Top-level keys that begin with an underscore are templates and left out.
+    """The data of YAML text, within the limits. Templates (see the module) are left out."""
     root = _composed(text, source)
     places: Places = {at: (_where(root), _where(root))}
     return Document(_plain(root, at, places), source, places)

@@ -30,6 +30,8 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 NAMES = "[key]"  # pydantic's word, in the place of an error, for a name of a mapping
 
+NULL = {"type": "null"}
+
 _NAMES = {"anyOf": [{"type": "string", "pattern": NAME_PATTERN, "maxLength": MAX_NAME}, {"const": "<<"}]}
 
 
@@ -184,9 +186,13 @@ def _at(whole: Schema, at: Sequence[str]) -> tuple[Schema, str]:
         if part == NAMES:
             inner = says["propertyNames"]["anyOf"][0]
         says = inner or says.get("items") or says.get("additionalProperties") or {}
-        options = says.get("anyOf", ())
-        says = next((kind for kind in options if kind.keys() & {"$ref", "oneOf"}), says)  # else null
-        if {"type": "null"} in options and says.get("anyOf"):
-            says = next(kind for kind in options if kind["type"] != "null")
+        says = given(says)
         says = whole["$defs"][says["$ref"].rpartition("/")[2]] if "$ref" in says else says
     return says, name
+
+
+def given(says: Schema) -> Schema:
+    """The schema of the mapping that may stand at a place, or of what may stand there besides null."""
+    kinds = says.get("anyOf", ())
+    mapping = next((kind for kind in kinds if kind.keys() & {"$ref", "oneOf"}), says)
+    return next(kind for kind in kinds if kind != NULL) if mapping is says and NULL in kinds else mapping

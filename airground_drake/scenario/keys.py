@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 from airground_drake.base.arrays import LARGEST
 from airground_drake.base.registry import PLUGIN
-from airground_drake.scenario.json_schema import Schema, kind_of
+from airground_drake.scenario.json_schema import Schema, given, kind_of
 
-NOTHING = {"type": "null"}
 MOST = {"exclusiveMaximum": "below", "maximum": "at most"}
 
 
@@ -45,7 +44,7 @@ def _sections(schema: Schema, part: Schema, path: str, kind: str = "") -> Iterat
     yield Section(path, part["description"], entries, kind)
     for key, says in keys:
         for where, below in (
-            ("", _given(says)),
+            ("", given(says)),
             (".NAME", says.get("additionalProperties") or {}),
             (".N", says.get("items") or {}),
         ):
@@ -59,7 +58,7 @@ def _sections(schema: Schema, part: Schema, path: str, kind: str = "") -> Iterat
 
 def _allowed(key: str, part: Schema) -> str:
     """What may stand under a key, and its default."""
-    says = part["properties"][key] | _given(part["properties"][key])
+    says = part["properties"][key] | given(part["properties"][key])
     words = [_kind(says)]
     if says.get("type") == "number":
         words += ["0 or more"] if says["minimum"] == 0.0 else ["above 0"] if says["minimum"] > 0.0 else []
@@ -77,15 +76,8 @@ def _allowed(key: str, part: Schema) -> str:
     return ", ".join(words)
 
 
-def _given(says: Schema) -> Schema:
-    """The mapping that may stand under a key, or what may stand there besides nothing."""
-    kinds = says.get("anyOf", ())
-    mapping = next((kind for kind in kinds if kind.keys() & {"$ref", "oneOf"}), says)
-    return next(kind for kind in kinds if kind != NOTHING) if mapping is says and NOTHING in kinds else mapping
-
-
 def _kind(says: dict[str, Any]) -> str:
-    says = _given(says)
+    says = given(says)
     if "anyOf" in says:
         return ", ".join([*(_kind(choice) for choice in says["anyOf"] if "enum" in choice), PLUGIN])
     if "enum" in says:

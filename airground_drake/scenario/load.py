@@ -18,9 +18,6 @@ from airground_drake.scenario import map_file, validate
 from airground_drake.scenario.document import Document, of_data, place_of, put, read, replace, simple, way
 from airground_drake.scenario.filled import filled
 from airground_drake.scenario.schema import SET, UNNAMED, Scenario, Vector
-from airground_drake.scenario.shipped import shipped
-
-__all__ = ["from_data", "load", "own", "resolved", "shipped", "validated"]
 
 Overrides = Sequence[str] | Mapping[str, Any]  # `dotted.key=value` with the value in YAML, or values by dotted key
 

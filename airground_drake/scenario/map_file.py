@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, ConfigDict
 from airground_drake.base import files
 from airground_drake.base.errors import Fault, ScenarioError
 from airground_drake.base.limits import MAX_RECTANGLES
-from airground_drake.base.values import Real, Words, as_float, wanted
+from airground_drake.base.values import Chance, Real, Words, as_float, wanted
 from airground_drake.scenario.document import MAX_BYTES, parsed
 from airground_drake.scenario.filled import filled
 from airground_drake.scenario.maps.grid import Frame, Grid
@@ -20,9 +20,6 @@ from airground_drake.scenario.maps.rectangles import covering
 from airground_drake.scenario.schema import Map, MapCells
 
 MOST_BYTES = 64_000_000  # most bytes of an image
-
-
-_Share = Annotated[float, wanted("a number from 0 to 1", strict=True, ge=0.0, le=1.0), BeforeValidator(as_float)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +35,8 @@ class MapServer:
     ]
     # Outer corner of the cell at the lower left, x and y in m; heading of the image, rad.
     origin: Annotated[list[Real], wanted("3 numbers: [x, y, yaw], m and rad", min_length=3, max_length=3)]
-    occupied_thresh: _Share  # probability above which a cell is occupied
-    free_thresh: _Share  # probability below which it is free
+    occupied_thresh: Chance  # probability above which a cell is occupied
+    free_thresh: Chance  # probability below which it is free
     negate: Annotated[int, wanted("0 or 1", ge=0, le=1)]  # 1 if white is occupied, not black
     mode: Annotated[str, BeforeValidator(lambda given: str(given).lower()), wanted("trinary", pattern="^trinary$")] = (
         "trinary"

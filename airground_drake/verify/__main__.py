@@ -72,7 +72,8 @@ def _line(verdict: Verdict) -> str:
 
 def _judge(target: str, wanted: Sequence[str], progress: Progress, *, allow_plugins: bool) -> list[Verdict]:
     # Third-party claims that a saved run names are imported only if they are wanted, and only if that is allowed.
-    from airground_drake.scenario.load import from_data, load, shipped
+    from airground_drake.scenario.load import from_data, load
+    from airground_drake.scenario.shipped import shipped
     from airground_drake.sim import trace
     from airground_drake.verify import judge, judge_model
     from airground_drake.verify.registry import model_claims, run_claims

@@ -59,6 +59,7 @@ class Claim(abc.ABC):
         expected: the status that a scenario expects by default.
         theorems: names of theorems, such as "Safety.unseen", or theories, such as "Plants", whose hypotheses it checks.
         exercised_by: the counted unit of `exercised`, in words that follow a number; '' without a count.
+        margin_decides: whether its margin is a distance from refutation; otherwise it only informs.
         about_the_law: whether it is about the package's control law or its predictions; with a user's controller of the
             UGVs it is then `not_run`, as expected.
     """
@@ -76,6 +77,7 @@ class Claim(abc.ABC):
     summary: str = ""
     formula: str = ""
     latex: tuple[str, ...] = ()
+    margin_decides: bool = True
     about_the_law: bool = False
 
     def due(self, own_controller: object) -> str:

@@ -55,8 +55,8 @@ class Finding:
 
     Attributes:
         status: the verdict class.
-        margin: signed distance from refutation (negative: refuted), in `unit`; None if the claim has no margin. That of
-            GATE-PLAN is a gap to an optimum, which refutes nothing.
+        margin: signed distance from refutation (negative: refuted), in `unit`; None if the claim has no margin. With
+            `Claim.margin_decides` false it refutes nothing, such as a gap to an optimum.
         unit: unit of the margin.
         where: where the margin is attained: robot, obstacle, time and the like.
         counterexample: for `refuted`: enough to reproduce it by hand.

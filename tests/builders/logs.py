@@ -14,6 +14,7 @@ import pandas as pd
 import yaml
 
 from airground_drake.base.arrays import Array
+from airground_drake.scenario.load import load, resolved
 from airground_drake.study.logs import opening, tracks
 from airground_drake.study.logs.judging import Judged, judge
 from airground_drake.study.logs.tables import Wanted
@@ -54,6 +55,11 @@ def write_scenario(folder: Path, **more: Any) -> Path:
     path = folder / "lab.yaml"
     path.write_text(yaml.safe_dump(scenario(**more)))
     return path
+
+
+def document(folder: Path, **more: Any) -> dict[str, Any]:
+    """The scenario as nested dicts and lists, with all defaults."""
+    return resolved(load(str(write_scenario(folder, **more))))
 
 
 def where(t_s: Array) -> dict[str, Array]:

@@ -18,7 +18,8 @@ from airground_drake.base.limits import MAX_UGVS
 from airground_drake.base.registry import METHODS, MODEL_CLAIMS, POLICIES, ROUTES, RUN_CLAIMS, SAMPLERS, UAV_TASKS
 from airground_drake.commands import COMMANDS
 from airground_drake.commands.listing import KINDS
-from airground_drake.scenario.load import load, resolved, shipped
+from airground_drake.scenario.load import load, resolved
+from airground_drake.scenario.shipped import shipped
 
 AIRGROUND = (sys.executable, "-m", "airground_drake")
 

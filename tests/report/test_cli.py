@@ -13,7 +13,8 @@ from report.cases import make_scenario
 from airground_drake.report import after_runs, make, screen
 from airground_drake.report.__main__ import main
 from airground_drake.report.model import of
-from airground_drake.scenario.load import load, shipped
+from airground_drake.scenario.load import load
+from airground_drake.scenario.shipped import shipped
 from airground_drake.sim import trace
 from airground_drake.sim.simulation import simulate
 from airground_drake.verify import __main__ as judge

@@ -15,8 +15,8 @@ from airground_drake.base.registry import METHODS, POLICIES
 from airground_drake.scenario import json_schema, schema
 from airground_drake.scenario.document import of_data
 from airground_drake.scenario.filled import filled
-from airground_drake.scenario.load import load, shipped
-from airground_drake.scenario.shipped import json_schema_file, shipped_files
+from airground_drake.scenario.load import load
+from airground_drake.scenario.shipped import json_schema_file, shipped, shipped_files
 
 SCHEMA = json_schema.scenario_schema(installed=False)
 VALIDATOR = Draft202012Validator(SCHEMA)

@@ -11,8 +11,8 @@ import pytest
 from airground_drake.base.registry import MODEL_CLAIMS, RUN_CLAIMS
 from airground_drake.report.interventions import avoidance
 from airground_drake.scenario.estimate import DEFAULT_LIMITS, within
-from airground_drake.scenario.load import load, shipped
-from airground_drake.scenario.shipped import shipped_files
+from airground_drake.scenario.load import load
+from airground_drake.scenario.shipped import shipped, shipped_files
 from airground_drake.sim.trace import Trace
 from airground_drake.verify import judge, judge_model
 from airground_drake.verify.claim import Verdict

@@ -9,7 +9,8 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from airground_drake.model.bodies.world import World
 from airground_drake.model.geometry.motion import Motion
-from airground_drake.scenario.load import load, shipped
+from airground_drake.scenario.load import load
+from airground_drake.scenario.shipped import shipped
 from airground_drake.sim import graphviz
 from airground_drake.sim.blocks import DecisionBlock
 from airground_drake.sim.components import stack_presets

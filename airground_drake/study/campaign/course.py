@@ -5,11 +5,11 @@ from dataclasses import asdict, dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema
+from pydantic import ConfigDict, PlainValidator, WithJsonSchema
 
 from airground_drake.base.arrays import Array
 from airground_drake.base.limits import MAX_UGVS
-from airground_drake.base.values import Number, Positive, as_float, refused
+from airground_drake.base.values import Chance, Positive, refused
 from airground_drake.model.geometry import convex, outline
 from airground_drake.scenario.schema import Obstacle
 from airground_drake.scenario.shapes import convex_parts
@@ -66,8 +66,7 @@ class Course:
     width_m: Positive = 16.0  # of the field
     preset_m_s: Positive = 1.0  # speed of the preset trajectories
     max_speed_m_s: Positive = 3.0  # of a UGV
-    # Share of the obstacles that are not on the UAV's map.
-    hidden: Annotated[Number, Field(ge=0.0, le=1.0), BeforeValidator(as_float)] = 0.0
+    hidden: Chance = 0.0  # share of the obstacles that are not on the UAV's map
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -104,7 +103,7 @@ class Course:
         return {"ugvs": ugvs, "obstacles": obstacles, **above}
 
     def _apart(self, rng: np.random.Generator, side: Array, least: float) -> Array:
-        """Draw positions (n, 2), m, at these x; any two on the same side are at least `apart`, m, apart."""
+        """Draw positions (n, 2), m, at these x; any two are at least `least`, m, apart."""
         places: list[Array] = []
         for x in side:
             for _ in range(TRIES):

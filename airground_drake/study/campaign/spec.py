@@ -30,8 +30,9 @@ from airground_drake.base.values import Real, Words, refused, wanted
 from airground_drake.scenario import plugins
 from airground_drake.scenario.document import UNKNOWN_KEY, Document, read, suggestion
 from airground_drake.scenario.filled import filled
-from airground_drake.scenario.load import from_data, load, shipped
+from airground_drake.scenario.load import from_data, load
 from airground_drake.scenario.schema import Scenario
+from airground_drake.scenario.shipped import shipped
 from airground_drake.study.campaign.course import REPLACES, Course
 from airground_drake.study.campaign.distributions import GRID, HALTON, KINDS, Key, combinations, made, stream, values_of
 from airground_drake.study.campaign.rows import TIMES
@@ -157,6 +158,25 @@ class Spec(File):
                 raise _unknown(self.source, "runs", run, scenario.runs)
         return replace(scenario, name=f"{_identifier(self.name)[: MAX_NAME - 1 - len(str(index))]}_{index}")
 
+    def check_keys(self) -> None:
+        """Refuse keys that the scenario does not have, and a key that would replace one given before it.
+
+        Raises:
+            ScenarioError: with the source `--set KEY`.
+        """
+        given: dict[str, str] = {}
+        for key in (*self.fixed, *self.drawn):
+            if key in given:
+                fault = Fault(f"it would replace {given[key]}, which is given before")
+                raise ScenarioError(f"--set {key}", key, fault, "wanted: one value for each key")
+            names = key.split(".")
+            given.update((".".join(names[:n]), key) for n in range(1, 1 + len(names)))
+        try:
+            self.draw(0)
+        except ScenarioError as error:
+            if error.value == UNKNOWN_KEY:  # no draw would be valid; other faults may concern this draw only
+                raise
+
     def refuse_plugins(self) -> None:
         """Refuse third-party code in the scenario and in everything that may be drawn.
 
@@ -221,22 +241,14 @@ def _check_overrides(spec: Spec, document: Document) -> None:
         if f"{key}.".startswith(tuple(f"{key_of}." for key_of in REPLACES)):
             wanted = "wanted: a key that the course does not draw; one under draw comes after the course"
             raise ScenarioError(document.where("set", key), f"set.{key}", Fault("the course would replace it"), wanted)
-    given: dict[str, str] = {}
-    for part, key in [*(("set", key) for key in spec.fixed), *(("draw", key) for key in spec.drawn)]:
-        if key in given:
-            fault = Fault(f"it would replace {given[key]}, which is given before")
-            raise ScenarioError(document.where(part, key), f"{part}.{key}", fault, "wanted: one value for each key")
-        names = key.split(".")
-        given.update((".".join(names[:n]), key) for n in range(1, 1 + len(names)))
     try:
         spec.base()
     except ScenarioError as error:
         raise _placed(error, document, "set") from None
     try:
-        spec.draw(0)
+        spec.check_keys()
     except ScenarioError as error:
-        if error.value == UNKNOWN_KEY:  # no draw would be valid; other faults may concern this draw only
-            raise _placed(error, document, "draw") from None
+        raise _placed(error, document, "draw", "set") from None
 
 
 def _check_names(spec: Spec, document: Document) -> None:
@@ -250,12 +262,13 @@ def _check_names(spec: Spec, document: Document) -> None:
             raise _unknown(document.where("marks", name, key=True), f"marks.{name}", name, TIMES)
 
 
-def _placed(error: ScenarioError, document: Document, part: str) -> ScenarioError:
-    """The error of an override, with its line in the spec."""
+def _placed(error: ScenarioError, document: Document, *parts: str) -> ScenarioError:
+    """The error of an override, with its line in the first of these parts of the spec that has its key."""
     key = error.source.removeprefix("--set ").partition("=")[0]
-    if (part, key) not in document.places:
-        return error
-    return ScenarioError(document.where(part, key), f"{part}.{error.key}", error.value, error.allowed)
+    for part in parts:
+        if (part, key) in document.places:
+            return ScenarioError(document.where(part, key), f"{part}.{error.key}", error.value, error.allowed)
+    return error
 
 
 def _unknown(source: str, key: str, name: str, allowed: Iterable[str]) -> ScenarioError:

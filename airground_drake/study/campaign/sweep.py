@@ -7,10 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from airground_drake.base.errors import ScenarioError, UnknownNameError
+from airground_drake.base.errors import UnknownNameError
 from airground_drake.base.registry import RUN_CLAIMS
 from airground_drake.scenario import plugins
-from airground_drake.scenario.document import UNKNOWN_KEY
 from airground_drake.scenario.estimate import DEFAULT_LIMITS
 from airground_drake.scenario.load import resolved, validated
 from airground_drake.scenario.schema import Scenario
@@ -45,8 +44,9 @@ def sweep(
         A row for each combination and run, see `swept.per_run`. `ended` says `judged`, or why not; `what` explains it.
 
     Raises:
-        ScenarioError: if the scenario is not valid, a key or a run does not exist, or third-party code is not allowed.
-        UnknownNameError: if a claim does not exist.
+        ScenarioError: if the scenario is not valid, a key does not exist or would replace one given before it, or
+            third-party code is not allowed.
+        UnknownNameError: if a run or a claim does not exist.
         ValueError: if a key has no values.
     """
     scenario = validated(scenario)
@@ -62,7 +62,7 @@ def sweep(
                 raise UnknownNameError(kind, name, allowed)
     if not allow_plugins:
         plugins.refuse(scenario, scenario.name)
-    _require_keys(spec)
+    spec.check_keys()
     work = partial(rows_of, spec, limits=DEFAULT_LIMITS._replace(plugins=allow_plugins))
     indices = range(spec.combinations)
     if jobs == 1:
@@ -71,12 +71,3 @@ def sweep(
         with pool.local(jobs) as processes:
             draws = {index: rows or died(index, spec.values(index)) for index, rows in processes(work, indices)}
     return per_run(table_of(list(chain.from_iterable(draws[index] for index in indices))))
-
-
-def _require_keys(spec: Spec) -> None:
-    """Refuse keys that a scenario does not have; other faults may be of some values only."""
-    try:
-        spec.draw(0)
-    except ScenarioError as error:
-        if error.value == UNKNOWN_KEY:
-            raise

@@ -14,7 +14,6 @@ import numpy as np
 from airground_drake.base import files
 from airground_drake.base.errors import AirgroundError, ScenarioError, described
 from airground_drake.base.statuses import PASSING
-from airground_drake.report.rules import PLANS
 from airground_drake.scenario import plugins
 from airground_drake.scenario.estimate import Limits, within
 from airground_drake.scenario.schema import Scenario
@@ -207,13 +206,13 @@ def _of_claim(verdict: Verdict) -> Row:
     against = verdict.counterexample or {}
     who = " and ".join(str(against[key]) for key in ("robot", "first", "second", "other") if key in against)
     broken = f"{against['hypothesis']}, {who or 'all'} at {against['t_s']:.2f} s" if "hypothesis" in against else ""
+    margin = verdict.margin if verdict.claim.margin_decides else None
     return {
         "claim": verdict.claim.id,
         "what": broken,
         "status": verdict.status,
         "as_expected": verdict.as_expected is not False,
-        # The number of the claim about plans is a gap to an optimum: the larger, the worse.
-        "margin": float("nan") if verdict.margin is None or verdict.claim.id == PLANS else float(verdict.margin),
+        "margin": float("nan") if margin is None else float(margin),
         "unit": verdict.unit,
         "exercised": float("nan") if verdict.exercised is None else float(verdict.exercised),
     }

@@ -11,6 +11,7 @@ from airground_drake.base.errors import LogError
 from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
 from airground_drake.study.logs.stream import PER_M, Stream
+from airground_drake.study.logs.units import begin_at_starts
 
 # Axes of a log along x, y and z of the scenario: as they are; and of one with x north, y east, z down.
 PLAIN, NED = "x,y,z", "y,x,-z"
@@ -19,8 +20,6 @@ OTHERS = {
     NED: "x is north, y east and z down", "x,-y,-z": "z is down", "x,-z,y": "y is up", "z,x,y": "y is up",
     "-x,z,y": "y is up", "-z,-x,y": "y is up", "x,z,y": "y is up, as in Unity",
 }  # fmt: skip
-# A body starts at its start in the scenario if it is this near; starts this far from (0, 0) distinguish axes, m.
-NEAR_M, APART_M = 0.1, 0.5
 LEVEL_M, WIDE_M = 0.1, 0.5  # heights of ground vehicles vary by less than this, and their horizontal motion is wider, m
 BELOW_M = 0.2  # an aircraft lower than this is below the ground, m
 # In names of files, topics and frames: the axes of PX4 and MAVLink.
@@ -90,13 +89,10 @@ def _ask(robots: Mapping[str, Stream], scenario: Json, why: str, likely: Iterabl
 
 def _fits(robots: Mapping[str, Stream], scenario: Json, axes: str) -> bool:
     """Whether robots begin at the scenario's starts, some far enough from (0, 0) to distinguish axes."""
-    starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2], dtype=np.float64) for name in robots}
-    if max((float(np.linalg.norm(start)) for start in starts.values()), default=0.0) < APART_M:
-        return False
-    first = {
+    first_m = {
         name: _turned(stream.places[:1], axes)[0, :2] / PER_M[stream.length_unit] for name, stream in robots.items()
     }
-    return all(float(np.linalg.norm(place - starts[name])) <= NEAR_M for name, place in first.items())
+    return begin_at_starts(first_m, scenario)
 
 
 def _below(robots: Mapping[str, Stream], scenario: Json) -> str:

@@ -108,7 +108,7 @@ class Choice(NamedTuple):
     """Choices of the command line."""
 
     rename: Mapping[str, str] = {}  # bodies by names in the log
-    # Frames to use, taken as one; positions in others are not used. None: all frames of the log.
+    # Frames to use, taken as one; positions in others are not used. Empty: all frames of the log.
     frames: Sequence[str] = ()
     without: Collection[str] = ()  # bodies of the scenario that are not judged
     uavs: Sequence[str] = ()  # further UAVs

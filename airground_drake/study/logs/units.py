@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from airground_drake.base.arrays import Array
 from airground_drake.base.errors import LogError
 from airground_drake.check.files import Json
 from airground_drake.check.scenario import robots_of
@@ -13,7 +14,8 @@ from airground_drake.study.logs.stream import OF_MESSAGES, PER_M, PER_S, Stream,
 
 # Stamps that would make a log this many times longer than the scenario are not since 1970 but in a finer unit.
 TOO_LONG = 100.0
-NEAR_M = 0.1  # a log that begins this close to a body's start begins there, m
+# A log that begins this close to a body's start begins there; starts this far from (0, 0) tell units and axes apart, m.
+NEAR_M, APART_M = 0.1, 0.5
 # Times this far apart, in a log this many times longer than the scenario, are milliseconds if no robot is then too
 # fast.
 LONG, SELDOM_S = 2.0, 4.0
@@ -197,14 +199,20 @@ def _time(
 
 def _fitting(streams: Mapping[str, Stream], scenario: Json, lengths: list[str]) -> list[str]:
     """The units in which all robots begin at the scenario's starts; none if these are all near (0, 0)."""
-    starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2]) for name in streams}
-    if max(float(np.linalg.norm(start)) for start in starts.values()) < 5.0 * NEAR_M:
-        return []
-    return [
-        unit for unit in lengths
-        if all(float(np.linalg.norm(stream.places[0, :2] / PER_M[stream.length_unit or unit] - starts[name])) <= NEAR_M
-               for name, stream in streams.items())
-    ]  # fmt: skip
+    fitting = []
+    for unit in lengths:
+        first_m = {name: stream.places[0, :2] / PER_M[stream.length_unit or unit] for name, stream in streams.items()}
+        if begin_at_starts(first_m, scenario):
+            fitting.append(unit)
+    return fitting
+
+
+def begin_at_starts(first_m: Mapping[str, Array], scenario: Json) -> bool:
+    """Whether first places, (2,) each, m, are the robots' starts, some of them `APART_M` or more from (0, 0)."""
+    starts = {name: np.array(robots_of(scenario)[name]["start_m"][:2], dtype=np.float64) for name in first_m}
+    if max((float(np.linalg.norm(start)) for start in starts.values()), default=0.0) < APART_M:
+        return False
+    return all(float(np.linalg.norm(place - starts[name])) <= NEAR_M for name, place in first_m.items())
 
 
 def _motion(streams: Mapping[str, Stream], scenario: Json, time: str, length: str) -> _Motion:

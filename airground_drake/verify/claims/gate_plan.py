@@ -102,6 +102,7 @@ class GatePlan(GateClaim):
     )
 
     exercised_by = "decisions based on a plan or on predicted outcomes"
+    margin_decides = False  # it is a gap to an optimum: the larger, the worse
 
     def judge_rows(self, trace: Trace, rows: list[DecisionRecord]) -> Finding:
         """Judge every plan; the margin is the largest gap."""

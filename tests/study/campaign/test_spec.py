@@ -129,6 +129,10 @@ def test_a_course_has_one_uav(tmp_path: Path) -> None:
             "scenario: minimal\ndraw: {obstacles.rock.position_m.0: {choice: [5]}, obstacles.rock: {choice: [{}]}}",
             ":2: draw.obstacles.rock: it would replace obstacles.rock.position_m.0, which is given before; wanted: one",
         ),
+        (
+            "scenario: minimal\nset:\n  control.motion_gain_1_s: 1\n  control: {}",
+            ":4: set.control: it would replace control.motion_gain_1_s, which is given before; wanted: one value",
+        ),
         ("scenario: minimal\nset: [1]", ":2: set: a list is given; wanted: a mapping with dotted keys"),
         ("scenario: minimal\nset: {contrl.period_s: 1}", ":2: set.contrl: unknown key; did you mean control?"),
         ("scenario: minimal\nset: {control.period_s: no}", ":2: set.control.period_s: 'no' is not allowed; wanted: a"),

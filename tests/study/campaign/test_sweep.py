@@ -38,6 +38,9 @@ def test_mistakes_are_named_and_impossible_values_have_a_row() -> None:
     scenario = load("minimal", {"duration_s": 0.5})
     with pytest.raises(ScenarioError, match="zeta_n"):
         sweep(scenario, {"decision.threshold.zeta_n": [1.0]})
+    gain = "control.motion_gain_1_s"
+    with pytest.raises(ScenarioError, match=f"control: it would replace {gain}, which is given before; wanted: one"):
+        sweep(scenario, {gain: [1.0, 2.0], "control": [{"period_s": 0.05}]})
     with pytest.raises(UnknownNameError, match="unknown run 'z'"):
         sweep(scenario, {KEY: [1.0]}, runs=["z"])
     with pytest.raises(UnknownNameError, match="SAFE-TRAC"):

@@ -11,17 +11,11 @@ from builders import logs
 from builders.logs import BROKEN, Motion, Ros
 
 from airground_drake.base.errors import LogError
-from airground_drake.scenario.load import load, resolved
 from airground_drake.study.logs.judging import BROKEN as NOT_KEPT
 from airground_drake.study.logs.judging import KEPT, JudgedPair, judge
 from airground_drake.study.logs.words import lines
 
 FULL = logs.motion()
-
-
-@pytest.fixture(scope="module")
-def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    return resolved(load(str(logs.write_scenario(tmp_path_factory.mktemp("lab")))))
 
 
 def pair_of(found: list[JudgedPair], *names: str) -> JudgedPair:
@@ -90,7 +84,7 @@ def test_two_recordings_of_one_time_are_refused(tmp_path: Path, document: dict[s
 def test_a_robot_that_stands_at_the_origin_at_first_is_there(tmp_path: Path) -> None:
     ugvs = logs.scenario()["ugvs"]
     ugvs["tb_1"] |= {"start_m": [0.0, 0.0, 0.0], "preset": {"waypoints_m": [[0.0, 0.0, 0.0], [1.6, 0.7, 0.0]]}}
-    document = resolved(load(str(logs.write_scenario(tmp_path, ugvs=ugvs))))
+    document = logs.document(tmp_path, ugvs=ugvs)
     t_s, places = FULL["tb_1"]
     there = places.copy()
     there[t_s <= 2.0] = 0.0  # and then it leaps
@@ -119,7 +113,7 @@ def test_what_could_be_read_in_two_ways_is_refused(
 
 
 def test_nothing_to_judge_is_no_verdict(tmp_path: Path) -> None:
-    alone = resolved(load(str(logs.write_scenario(tmp_path, obstacles={}))))
+    alone = logs.document(tmp_path, obstacles={})
     found = logs.read(written(tmp_path, logs.long({"tb_0": FULL["tb_0"]})), alone, without=["tb_1", "uav"])
     with pytest.raises(LogError, match="no distance is left to judge: of tb_0 nothing else is in the log or scenario"):
         judge(found, alone)
@@ -405,7 +399,7 @@ def test_rows_nanoseconds_apart_make_no_speed(tmp_path: Path) -> None:
     """A run's rows stand 1.6 ns apart at an event; rounded to whole nanoseconds that is 2 ns, or 1 ns."""
     walks = {"radius_m": 0.2, "moves": {"waypoints_m": [[1.0, -2.0], [1.0, 2.0]], "speed_m_s": 0.6}}
     person = {**walks, "max_speed_m_s": 0.6}
-    document = resolved(load(str(logs.write_scenario(tmp_path, obstacles={"person": person}))))
+    document = logs.document(tmp_path, obstacles={"person": person})
     whole = np.arange(0.0, 2.0, 0.05)
     t_s = np.sort(np.concatenate([whole, whole + 0.0123456784, whole + 0.0123456800]))
     way = np.stack([0.0 * t_s + 1.0, -2.0 + 0.6 * t_s, 0.0 * t_s], axis=1)

@@ -18,7 +18,6 @@ from builders import logs
 from builders.logs import BROKEN, EPOCH_NS, Motion, Ros
 
 from airground_drake.base.errors import LogError
-from airground_drake.scenario.load import load, resolved
 from airground_drake.study.logs.judging import BROKEN as NOT_KEPT
 from airground_drake.study.logs.judging import KEPT, judge
 
@@ -510,11 +509,6 @@ FORMS = {
         table("log.csv", lambda: logs.long({name: FLAT[name] for name in ("tb_0", "tb_1")})), FLAT
     ),
 }  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    return resolved(load(str(logs.write_scenario(tmp_path_factory.mktemp("lab")))))
 
 
 @pytest.mark.parametrize("name", FORMS)

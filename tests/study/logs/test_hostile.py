@@ -29,11 +29,6 @@ FULL = logs.motion(every=4)
 LONG = logs.text(logs.long(FULL))
 
 
-@pytest.fixture(scope="module")
-def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    return resolved(load(str(logs.write_scenario(tmp_path_factory.mktemp("lab")))))
-
-
 def of_mcap(folder: Path) -> Path:
     logs.mcap_json(folder / "a.mcap", logs.foxglove(FULL, {}))
     return folder / "a.mcap"

@@ -7,19 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import logs
-from builders.logs import BROKEN, Motion
+from builders.logs import BROKEN, Motion, document
 
 from airground_drake.base.errors import LogError
-from airground_drake.scenario.load import load, resolved
 from airground_drake.study.logs import words
 from airground_drake.study.logs.judging import judge
 from airground_drake.study.logs.stream import Stream
 
 FULL = logs.motion()
-
-
-def document(folder: Path, **more: Any) -> dict[str, Any]:
-    return resolved(load(str(logs.write_scenario(folder, **more))))
 
 
 def moved(bodies: Motion, **change: Callable[[Any, Any], tuple[Any, Any]]) -> Motion:

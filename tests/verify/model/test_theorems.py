@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from airground_drake.base.registry import MODEL_CLAIMS
-from airground_drake.scenario.load import load, shipped
+from airground_drake.scenario.load import load
+from airground_drake.scenario.shipped import shipped
 from airground_drake.verify.claim import ModelClaim
 from airground_drake.verify.claims import safe_inv
 from airground_drake.verify.claims.thr_trig import TriggerLevels, isolation
