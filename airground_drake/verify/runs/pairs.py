@@ -59,8 +59,6 @@ class Pair(NamedTuple):
     error_m: float = 0.0  # sum of the bounds of the errors of the measured positions
     asynchronous: bool = False  # whether each of two UGVs acts on an old position of the other one
     slip_m: float = 0.0  # how much of its command the robot may miss in a control period
-    # How far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
-    drawn_m: float = 0.0
     # Duration of commands already given, where the theorem requires a safe start of the bodies, too (they lag, are late
     # or follow the steered point as a trailer); None where it does not.
     under_way_s: float | None = None
@@ -125,8 +123,8 @@ def pairs_by(
         row, last = there.get(second, (0, end))
         safe = given.required_m + sum(given.radii_m)
         part, views_m = part_of_gain(own, other), float(of_views(safe, own, other, gain=gain))
-        drawn = own.cover_m if own.drawn and second in there and not passive else 0.0
-        needs_start = drawn or (not passive and (own.late or other.late))
+        drawn = own.drawn and own.cover_m > 0.0 and second in there
+        needs_start = not passive and (drawn or own.late or other.late)
         yield Pair(
             first, second, given.required_m, sum(given.radii_m), share, reach, row, last, speed,
             more_m=float(law_distance(safe, own, other, gain=gain, passive=passive)) - safe,
@@ -136,7 +134,6 @@ def pairs_by(
             error_m=own.error_m + other.error_m,
             asynchronous=given.kind == ASYNCHRONOUS,
             slip_m=own.drift_m_s * period,
-            drawn_m=drawn,
             under_way_s=max(own.delay_s, other.delay_s) if needs_start else None,
         )  # fmt: skip
 
