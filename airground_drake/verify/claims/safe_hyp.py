@@ -88,10 +88,10 @@ class Guarantee(NamedTuple):
     pair: Pair  # the two bodies
     # Violation of the inequalities at each sample, e_i + e_j, (K,), m per control period; 0: both are met.
     missed_m: Array
-    short_m: float  # deficit of the distance of the steered points at the start, or when the obstacle appeared, m
-    # What the bodies keep where their steered points keep m - max(e / a - w / A, short_m). There m is the distance in
-    # the law, e the largest of `missed_m`, a = min(A h, 1), and w the drift that users' plants declare. Without a gain
-    # no distance is restored, and the points keep m - K e - short_m. -inf: no guarantee.
+    # What the bodies keep where their steered points keep m - max(e / a - w / A, s). There m is the distance in the
+    # law, e the largest of `missed_m`, a = min(A h, 1), w the drift that users' plants declare, and s the deficit of
+    # the points' distance at the start, or when the obstacle appeared. Without a gain no distance is restored, and the
+    # points keep m - K e - s. -inf: no guarantee.
     gap_m: float
     why: str = ""  # the reason if there is no guarantee
 
@@ -323,7 +323,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
                 points = nextafter(pair.law_m - rounded_up(lost) - pair.views_m, -inf)
                 kept = kept_distance(points, *both, gain=trace.scenario.control.avoidance_gain_1_s) - pair.radii_m
                 gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
-        yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
+        yield Guarantee(pair, missed_m, gap, why)
 
 
 def _unsure_m(trace: Trace, pair: Pair) -> float:
@@ -341,8 +341,8 @@ def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
     short = shortage(places[0], places[1], pair.law_m)
     lost = sum(map(Fraction, missed.tolist()), short)
     if lost > Fraction(pair.law_m) / 2:
-        return Guarantee(pair, missed, rounded_up(short), -inf, "the steps miss half of the distance in all")
-    return Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
+        return Guarantee(pair, missed, -inf, "the steps miss half of the distance in all")
+    return Guarantee(pair, missed, -rounded_up(lost - Fraction(pair.required_m)))
 
 
 def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> list[tuple[Array, Array]]:
