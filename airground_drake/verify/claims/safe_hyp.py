@@ -19,7 +19,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.exact import decimal
 from airground_drake.model.plants.budget import AT_REST, kept_distance, part_of_gain
 from airground_drake.model.plants.plant import Premise, Recorded
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
@@ -273,10 +273,11 @@ def _gain(trace: Trace) -> Fraction:
     return min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
 
 
+@per_trace
 def guarantees(trace: Trace) -> list[Guarantee]:
     """The promised distance of each pair that comes near."""
     # Other pairs stay so far apart that the longest steps of both could not break their distance.
-    return trace.derived("guarantees", lambda: list(_guarantees(trace)))
+    return list(_guarantees(trace))
 
 
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
