@@ -9,7 +9,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.scenario.schema import Control
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.shortfalls import demanded
 from airground_drake.verify.runs.old_positions import heard_places, unsure_m
 from airground_drake.verify.runs.pairs import contacts, is_planar, pairs_beside, parts_of
@@ -25,8 +25,7 @@ class Inequalities(NamedTuple):
     # Sorted by control sample, then in the order of the controller: barriers at rest, robots, barriers that move.
 
     sample: Indices  # number of the control sample, (C,)
-    # What is avoided, (C,): the number of a part in `pairs.parts_of`, or that of a robot after all parts.
-    column: Indices
+    column: Indices  # what is avoided, (C,): its number in `avoided`
     normal: Array  # (C, 3)
     distance: Array  # distance from the avoided body, or from its last known position, (C,), m
     bound: Array  # (C,), m/s
@@ -35,6 +34,13 @@ class Inequalities(NamedTuple):
     def slack(self, velocity: Array) -> Array:
         """Slack of the velocities at the control samples, (S, 3), in each inequality, (C,), m/s."""
         return np.asarray(np.einsum("cd,cd->c", self.normal, velocity[self.sample]) - self.bound)
+
+
+@per_trace
+def avoided(trace: Trace) -> list[str]:
+    """The bodies that robots avoid: for each part in `pairs.parts_of` its barrier, then the robots."""
+    parts = parts_of(trace)
+    return [*(parts.names[owner] for owner in parts.owner.tolist()), *trace.robots]
 
 
 def least_speeds(distance: Array, safe: Array, share: Array, control: Control, speed: Array | float = 0.0) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.outlines import Cores, apart_by_blocks, away_from, least_distances, over_time
-from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
+from airground_drake.verify.runs.control_law import Inequalities, avoided, inequalities_of
 from airground_drake.verify.runs.pairs import (
     BENT_M,
     CENTRE,
@@ -31,7 +31,6 @@ from airground_drake.verify.runs.pairs import (
     off_m_of,
     origin_of,
     pairs_of,
-    parts_of,
 )
 from airground_drake.verify.runs.passive import AT_LIMIT_M_S, STANDING_M_S, Periods, periods_of
 
@@ -282,8 +281,6 @@ def _blocked_by(trace: Trace, pair: Pair, periods: Periods, k: int, given: Inequ
     retreat = wished * periods.normal[k]
     of_sample = np.flatnonzero(given.sample == sample)
     missed = given.normal[of_sample] @ retreat < given.bound[of_sample] - BLOCKED_M_S
-    parts = parts_of(trace)
-    columns = given.column[of_sample[missed]].tolist()
-    m = len(parts.owner)
-    names = [parts.names[parts.owner[c]] if c < m else trace.robots[c - m] for c in columns]
-    return [name for name in dict.fromkeys(names) if name != pair.second]
+    bodies = avoided(trace)
+    names = dict.fromkeys(bodies[column] for column in given.column[of_sample[missed]].tolist())
+    return [name for name in names if name != pair.second]
