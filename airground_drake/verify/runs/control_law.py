@@ -29,7 +29,6 @@ class Inequalities(NamedTuple):
     normal: Array  # (C, 3)
     distance: Array  # distance from the avoided body, or from its last known position, (C,), m
     bound: Array  # (C,), m/s
-    retreat: Array  # n.v at which the robot should retreat, (C,), m/s, a task below all inequalities; 0: it need not
 
     def slack(self, velocity: Array) -> Array:
         """Slack of the velocities at the control samples, (S, 3), in each inequality, (C,), m/s."""
@@ -52,11 +51,6 @@ def least_speeds(distance: Array, safe: Array, share: Array, control: Control, s
     bound = share * demanded(safe - distance, control.avoidance_gain_1_s, 1.0 / period)
     passive = np.minimum(-(distance - safe - speed * period) / period, 0.0)
     return np.where(distance <= control.sensing_range_m, np.where(np.asarray(speed) > 0.0, passive, bound), -np.inf)
-
-
-def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Array:
-    """Speeds n.v, (...), m/s, at which a robot should retreat from bodies that may move: V - (D - d) / h, or 0."""
-    return np.where(speed > 0.0, np.maximum(speed - (distance - safe) / period_s, 0.0), 0.0)
 
 
 def _towards_unsure(
@@ -107,7 +101,6 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     normal *= PLANE if planar else 1.0
     distance = np.append(near.away.distance, apart)
     bound = least_speeds(distance, safe, share, control, speed)
-    retreat = retreats(distance, safe, speed, control.period_s)
     when = np.append(near.place, sample)
     number = np.array([trace.robots.index(name) for name in others], dtype=np.intp)
     column = np.append(near.core, len(parts.owner) + number[other])
@@ -115,8 +108,8 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     if unsure.any():
         excess = distance - safe - np.where(speed > 0.0, speed * control.period_s, unsure)
         k, normal, bound = _towards_unsure(normal, bound, distance, excess, unsure, control.period_s, planar=planar)
-        when, column, distance, retreat = when[k], column[k], distance[k], retreat[k]
+        when, column, distance = when[k], column[k], distance[k]
     moves = np.array([trace.scenario.barriers[name].moves is not None for name in parts.names], dtype=np.bool_)
     rank = np.concatenate([np.where(moves[parts.owner], 2, 0), np.ones(len(trace.robots), dtype=np.intp)])
     order = np.lexsort([column, rank[column], when])
-    return Inequalities(when[order], column[order], normal[order], distance[order], bound[order], retreat[order])
+    return Inequalities(when[order], column[order], normal[order], distance[order], bound[order])
