@@ -67,6 +67,10 @@ class Pair(NamedTuple):
     def rows(self) -> slice:
         return slice(self.row, self.last + 1)
 
+    def other(self, robot: str) -> str:
+        """The body that this robot of the pair must avoid."""
+        return self.second if robot == self.first else self.first
+
     @property
     def safe_m(self) -> float:
         """Required distance of the robot's centre from the other's core, m."""
@@ -181,6 +185,11 @@ def origin_of(trace: Trace, name: str) -> Array:
     return np.broadcast_to(0.0, (len(trace.t), 3))
 
 
+def steered(trace: Trace, name: str) -> Array:
+    """Where the steered point of a robot or the origin of a barrier's parts is at the rows, (T, 3), m."""
+    return trace.position(name) if name in trace.robots else origin_of(trace, name)
+
+
 def seen_from(trace: Trace, robot: str, other: str) -> Array:
     """Places of a robot's body at the rows as seen from another robot or the origin of a barrier's parts, (T, 3), m."""
     return trace.body(robot) - origin_of(trace, other)
@@ -273,8 +282,7 @@ def at_appearance(trace: Trace, gap: Gap) -> bool:
 def steered_margin(trace: Trace, pair: Pair) -> float:
     """The least distance of a pair's steered points minus the law's distance, m."""
     cores = cores_of(trace).get(pair.second, CENTRE)
-    second = trace.position(pair.second) if pair.second in trace.robots else origin_of(trace, pair.second)
-    way = (trace.position(pair.first) - second)[pair.rows]
+    way = (trace.position(pair.first) - steered(trace, pair.second))[pair.rows]
     return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
 
 
