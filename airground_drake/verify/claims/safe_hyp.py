@@ -399,16 +399,21 @@ def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]
 
 def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
     """Beside obstacles that may move: the passive law, and their declared speeds."""
-    period_s, ends = trace.scenario.control.period_s, period_ends(trace)
+    t, period_s = trace.sampled("t_s"), trace.scenario.control.period_s
     for periods in beside(trace):
         about = {"first": periods.pair.first, "second": periods.pair.second}
         yield _Hypothesis(PASSIVE, "m", trace.t[periods.row], 0.0 - periods.missed_m, DISTANCE_TOLERANCE_M, about)
     for name, speed in speeds(trace).items():
         spare = trace.scenario.barriers[name].expected_speed_m_s - speed
-        yield _Hypothesis(DECLARED, "m/s", trace.t[ends[:-1]], spare, DISTANCE_TOLERANCE_M / period_s, {"other": name})
-        place = trace.position(name)
-        off = np.linalg.norm(place - interpolate(trace.t[ends], place[ends], trace.t), axis=1)
-        yield _Hypothesis("straight motion", "m", trace.t, 0.0 - off, DISTANCE_TOLERANCE_M, {"other": name})
+        yield _Hypothesis(DECLARED, "m/s", t, spare, DISTANCE_TOLERANCE_M / period_s, {"other": name})
+        yield _straight(trace, name, {"other": name})
+
+
+def _straight(trace: Trace, name: str, about: dict[str, Any]) -> _Hypothesis:
+    """A steered point or an obstacle moves straight between control samples."""
+    ends, place = period_ends(trace), trace.position(name)
+    off = np.linalg.norm(place - interpolate(trace.t[ends], place[ends], trace.t), axis=1)
+    return _Hypothesis("straight motion", "m", trace.t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
 
 
 def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
@@ -466,14 +471,12 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     robots = trace.scenario.robots
     t = trace.t
     samples = trace.sample_rows
-    spacing = np.diff(np.append(t[samples], t[-1]))
+    spacing = np.diff(t[period_ends(trace)])
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
-    ends = np.append(samples, len(t) - 1)
     for robot in trace.robots:
         place, about = trace.position(robot), {"robot": robot}
-        off = np.linalg.norm(place - interpolate(t[ends], place[ends], t), axis=1)
         if not trace.plant(robot).measured:  # the cover of such a robot is from the straight line
-            yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
+            yield _straight(trace, robot, about)
         spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
         if trace.scenario.position_error_m or (trace.scenario.sensing and not trace.scenario.announces):
