@@ -295,10 +295,11 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     lower = least_distances(beside, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
     most = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
     t = trace.t[pair.rows]
-    approaches = list[Approach]()
+    far = np.where(lower < pair.safe_m, inf, lower)  # these segments need not be divided
+    k = int(far.argmin())
+    best = Approach(float(far[k]), float(t[k]), k + 1)
     for k in sorted(np.flatnonzero(lower < pair.safe_m).tolist(), key=lower.__getitem__):
-        best = min(approaches).distance_m if approaches else inf
-        if lower[k] > best:
+        if lower[k] > best.distance_m:
             break
         for parts in (min(FEW_PARTS, most), most):  # a few suffice to exclude most segments
             shares = np.linspace(0.0, 1.0, parts + 1)
@@ -310,15 +311,11 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
             nearest = Approach(
                 float(least[j]) - off_m / parts**2, instant_of(t, k + 1, (j + float(where[j])) / parts), k + 1
             )
-            if nearest.distance_m > best:
+            if nearest.distance_m > best.distance_m:
                 break
         else:
-            approaches.append(nearest)
-    rest = np.delete(lower, np.flatnonzero(lower < pair.safe_m))
-    if len(rest):
-        k = int(np.flatnonzero(lower == rest.min())[0])
-        approaches.append(Approach(float(rest.min()), float(t[k]), k + 1))
-    return min(approaches)
+            best = min(best, nearest)
+    return best
 
 
 def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:
