@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 from airground_drake.base.errors import TraceError
+from airground_drake.base.exact import decimal
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.finding import Finding
@@ -43,7 +44,7 @@ class ZenoTrace(TraceClaim):
         evidence = {
             "triggers": {ugv: {"count": len(times), "t_s": times} for ugv, times in triggers.items()},
             "bound_s": bound,
-            "most_triggers_possible": int(trace.scenario.duration_s / bound) + 1,
+            "most_triggers_possible": int(decimal(trace.scenario.duration_s) // decimal(bound)) + 1,
         }
         gaps = [(t_s - before, ugv, before, t_s) for ugv, times in triggers.items() for before, t_s in pairwise(times)]
         if not gaps:
