@@ -267,10 +267,11 @@ def _finite(metres: float) -> float | None:
     return metres if isfinite(metres) else None
 
 
-def _gain(trace: Trace) -> Fraction:
-    """a = min(A h, 1), of the exact decimals."""
-    control = trace.scenario.control
-    return min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
+def _gain(trace: Trace, pair: Pair) -> Fraction:
+    """a = min(A h, 1), of the exact decimals, or the part of it by which the pair recovers a distance."""
+    control, bounds = trace.scenario.control, bounds_of(trace)
+    of_law = min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
+    return of_law * Fraction(part_of_gain(bounds[pair.first], bounds.get(pair.second, AT_REST)))
 
 
 @per_trace
@@ -284,7 +285,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     samples, last = period_ends(trace), last_period(trace)
     places = {name: trace.position(name)[samples] for name in trace.robots}
     longest = {name: _longest(way, float(last)) for name, way in places.items()}
-    pairs, of_law, bounds = pairs_of(trace), _gain(trace), bounds_of(trace)
+    pairs, bounds = pairs_of(trace), bounds_of(trace)
     reach = np.array([pair.law_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
     reach += [_unsure_m(trace, pair) if pair.asynchronous else 0.0 for pair in pairs]
     beyond = SCREEN_M + np.array([pair.cover_m for pair in pairs])  # of the bodies from the points that are steered
@@ -301,7 +302,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         first = places[pair.first][there]
         beside = _beside(trace, pair, places, there, float(reach[k]))
         both = bounds[pair.first], bounds.get(pair.second, AT_REST)
-        gain = of_law * Fraction(part_of_gain(*both))
+        gain = _gain(trace, pair)
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
         seen = partial(_seen, trace, pair, there) if pair.error_m or part_of_gain(*both) < 1.0 else None
         missed = [
@@ -387,10 +388,10 @@ def _longest(places: Array, last: float) -> float:
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
     """The lost distance, m, because a sample violates the inequalities."""
-    t, bounds = trace.sampled("t_s"), bounds_of(trace)
+    t = trace.sampled("t_s")
     for promised in kept:
         pair, missed_m = promised.pair, promised.missed_m
-        gain = float(_gain(trace)) * part_of_gain(bounds[pair.first], bounds.get(pair.second, AT_REST))
+        gain = float(_gain(trace, pair))
         lost = np.maximum(missed_m / gain - pair.drift_m, 0.0) if gain else missed_m * len(t)
         lost = np.cumsum(missed_m) if pair.asynchronous else lost
         about = {"first": pair.first, "second": pair.second}
