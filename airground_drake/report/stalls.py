@@ -11,8 +11,7 @@ from airground_drake.base.errors import TraceError
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.live_goal import AT_REST_M, AT_REST_S
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
-from airground_drake.verify.runs.pairs import parts_of
+from airground_drake.verify.runs.control_law import Inequalities, avoided, inequalities_of
 from airground_drake.verify.runs.proposals import proposal_of
 
 PUSH = 1e-3  # a body holds a UGV if it blocks more than this share of its desired velocity
@@ -64,7 +63,6 @@ def _stall(trace: Trace, ugv: str, first: int, last: int, given: Inequalities) -
 
 def _held_by(trace: Trace, ugv: str, sample: int, given: Inequalities) -> list[str]:
     """The bodies whose avoidance inequalities block a UGV's desired velocity at a sample."""
-    parts = parts_of(trace)
     binding = (given.sample == sample) & (given.slack(trace.chosen(ugv)) <= HELD_M_S)
     wish = _wish(trace, ugv, sample)
     speed = float(np.linalg.norm(wish))
@@ -75,7 +73,7 @@ def _held_by(trace: Trace, ugv: str, sample: int, given: Inequalities) -> list[s
     if left > UNEXPLAINED:
         return []
     columns: Indices = given.column[binding][shares > PUSH]
-    bodies = [*(parts.names[owner] for owner in parts.owner), *trace.robots]
+    bodies = avoided(trace)
     return list(dict.fromkeys(bodies[column] for column in columns.tolist()))
 
 

@@ -19,7 +19,7 @@ from airground_drake.base.statuses import PASSING, STATUSES, Status, meets, outc
 from airground_drake.model.bodies import motion
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
-from airground_drake.verify.finding import Chart, Failure, Finding
+from airground_drake.verify.finding import Chart, Finding
 
 __all__ = ["Claim", "Finding", "ModelClaim", "TraceClaim", "Verdict", "require_motion", "require_whole_run"]
 
@@ -100,7 +100,7 @@ class Claim(abc.ABC):
             finding = well_formed(self, find())
             json.dumps(finding.to_json(), allow_nan=False)  # a margin that is not a number must not pass
         except (Exception, SystemExit) as error:
-            return Finding("error", evidence=Failure(described(error)))
+            return Finding("error", evidence={"error": described(error)})
         return finding
 
 
@@ -146,7 +146,7 @@ class ModelClaim(Claim):
     def judge(self, inputs: dict[str, Any]) -> Finding:
         """`check`, with exceptions turned into the status `error`."""
         if set(inputs) == {"error"}:
-            return Finding("error", evidence=Failure(inputs["error"]))
+            return Finding("error", evidence=inputs)
         if OWN in inputs:
             return unjudged(inputs[OWN])
         return self.decided(lambda: self.check(inputs))

@@ -11,13 +11,6 @@ from airground_drake.base.statuses import Status
 
 
 @dataclass(frozen=True)
-class Failure:
-    """Why a claim could not be decided."""
-
-    error: str
-
-
-@dataclass(frozen=True)
 class Chart:
     """Lines and marked points, drawn in a report beside the claim that it is about.
 
@@ -60,8 +53,8 @@ class Finding:
         unit: unit of the margin.
         where: where the margin is attained: robot, obstacle, time and the like.
         counterexample: for `refuted`: enough to reproduce it by hand.
-        evidence: numbers behind the verdict, a dict: its keys are those in report.json, its values strict JSON, arrays
-            and dataclasses. A `Failure` if the claim could not be decided.
+        evidence: numbers behind the verdict: the keys are those in report.json, the values strict JSON, arrays and
+            dataclasses. If the claim could not be decided, `error` says why.
         quantity: what the margin is of, in a few words.
         exercised: how often the claim was put to the test, in what its `exercised_by` counts; 0: nothing could have
             refuted it; None: not counted.
@@ -74,7 +67,7 @@ class Finding:
     unit: str = ""
     where: dict[str, Any] = field(default_factory=dict)
     counterexample: dict[str, Any] | None = None
-    evidence: Any = field(default_factory=dict)
+    evidence: dict[str, Any] = field(default_factory=dict)
     quantity: str = ""
     exercised: int | None = None
     figure: Chart | None = None

@@ -9,8 +9,8 @@ import numpy.typing as npt
 from airground_drake.base.arrays import Array
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import Cores, away_from
-from airground_drake.verify.runs.control_law import PLANE, least_speeds, retreats
-from oracles.control_law import Asked, Inequalities, commanded, tracking
+from airground_drake.verify.runs.control_law import PLANE, least_speeds
+from oracles.control_law import Asked, Inequalities, commanded, retreats, tracking
 from oracles.positions import towards_old
 from oracles.turning import able, edges
 from oracles.turning import rates as rates_of

@@ -12,9 +12,9 @@ from airground_drake.base.arrays import Array
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
 from airground_drake.verify.engines.geometry import interpolate
-from airground_drake.verify.runs.control_law import ON_TOP, PLANE, inequalities_of
+from airground_drake.verify.runs.control_law import ON_TOP, PLANE, avoided, inequalities_of
 from airground_drake.verify.runs.control_law import Inequalities as OfRun
-from airground_drake.verify.runs.pairs import parts_of
+from airground_drake.verify.runs.pairs import pairs_beside, parts_of
 from airground_drake.verify.runs.proposals import ProposalRecord
 from oracles.positions import acts_on_old, old_positions, unheard
 from oracles.projection import CONTRADICTION_M_S, closest, least_violation, shortened
@@ -52,7 +52,8 @@ def as_seen(trace: Trace, robot: str) -> Inequalities:
     k = np.arange(len(given.sample)) - np.searchsorted(given.sample, given.sample)
     most = int(k.max(initial=-1)) + 1
     normal, bound, retreat = np.zeros((count, most, 3)), np.full((count, most), -np.inf), np.zeros((count, most))
-    normal[given.sample, k], bound[given.sample, k], retreat[given.sample, k] = given.normal, given.bound, given.retreat
+    normal[given.sample, k], bound[given.sample, k] = given.normal, given.bound
+    retreat[given.sample, k] = _retreats(trace, robot, given)
     return Inequalities(normal, bound, retreat if retreat.any() else None).also(*old_positions(trace, robot))
 
 
@@ -63,6 +64,19 @@ def _current(trace: Trace, robot: str) -> OfRun:
     if acts_on_old(trace) and robot in trace.ugvs:
         lacks |= (given.column >= parts) & (given.column < parts + len(trace.ugvs))
     return OfRun(*(array[~lacks] for array in given))
+
+
+def _retreats(trace: Trace, robot: str, given: OfRun) -> Array:
+    """Speeds n.v at which a robot should retreat from the body of each inequality, (C,), m/s."""
+    pairs = pairs_beside(trace, robot)
+    beside = [pairs.get(name) for name in avoided(trace)]  # None: the robot itself
+    safe, speed = (np.array([getattr(pair, name, 0.0) for pair in beside]) for name in ("law_m", "speed_m_s"))
+    return retreats(given.distance, safe[given.column], speed[given.column], trace.scenario.control.period_s)
+
+
+def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Array:
+    """Speeds n.v, (...), m/s, at which a robot should retreat from bodies that may move: V - (D - d) / h, or 0."""
+    return np.where(speed > 0.0, np.maximum(speed - (distance - safe) / period_s, 0.0), 0.0)
 
 
 def retreating(below: Array, given: Inequalities, limit: Array | float, *, planar: bool) -> Array:

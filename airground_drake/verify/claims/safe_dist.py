@@ -15,7 +15,7 @@ from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.safe_inv import stable
 from airground_drake.verify.finding import Finding
-from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim, is_proof
+from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 from airground_drake.verify.pair_kinds import PairKind, constants, kinds_of
 from airground_drake.verify.runs.passive import beside
 
@@ -122,7 +122,7 @@ class SafeDist(TheoremClaim):
 
     def with_runs(self, finding: Finding, seen: Sequence[tuple[int, ...]]) -> Finding:
         passive, once, kept = (sum(column) for column in zip(*seen, (0, 0, 0), strict=True))
-        if not passive or not is_proof(finding.evidence):
+        if not passive or "proof" not in finding.evidence:
             return finding
         # too near to an obstacle that may move: a retreat at w or more with `w_h_once`, at w + V or more with `kept`
         periods = {"passive_periods": passive, "passive_periods_w_h_once": once, "passive_periods_kept": kept}

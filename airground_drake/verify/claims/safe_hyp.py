@@ -19,7 +19,7 @@ from airground_drake.base.arrays import Array
 from airground_drake.base.exact import decimal
 from airground_drake.model.plants.budget import AT_REST, kept_distance, part_of_gain
 from airground_drake.model.plants.plant import Premise, Recorded
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S, TraceClaim
 from airground_drake.verify.engines.geometry import interpolate
 from airground_drake.verify.engines.outlines import Cores, apart_by_blocks
@@ -88,10 +88,10 @@ class Guarantee(NamedTuple):
     pair: Pair  # the two bodies
     # Violation of the inequalities at each sample, e_i + e_j, (K,), m per control period; 0: both are met.
     missed_m: Array
-    short_m: float  # deficit of the distance of the steered points at the start, or when the obstacle appeared, m
-    # What the bodies keep where their steered points keep m - max(e / a - w / A, short_m). There m is the distance in
-    # the law, e the largest of `missed_m`, a = min(A h, 1), and w the drift that users' plants declare. Without a gain
-    # no distance is restored, and the points keep m - K e - short_m. -inf: no guarantee.
+    # What the bodies keep where their steered points keep m - max(e / a - w / A, s). There m is the distance in the
+    # law, e the largest of `missed_m`, a = min(A h, 1), w the drift that users' plants declare, and s the deficit of
+    # the points' distance at the start, or when the obstacle appeared. Without a gain no distance is restored, and the
+    # points keep m - K e - s. -inf: no guarantee.
     gap_m: float
     why: str = ""  # the reason if there is no guarantee
 
@@ -267,23 +267,25 @@ def _finite(metres: float) -> float | None:
     return metres if isfinite(metres) else None
 
 
-def _gain(trace: Trace) -> Fraction:
-    """a = min(A h, 1), of the exact decimals."""
-    control = trace.scenario.control
-    return min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
+def _gain(trace: Trace, pair: Pair) -> Fraction:
+    """a = min(A h, 1), of the exact decimals, or the part of it by which the pair recovers a distance."""
+    control, bounds = trace.scenario.control, bounds_of(trace)
+    of_law = min(decimal(control.avoidance_gain_1_s) * decimal(control.period_s), Fraction(1))
+    return of_law * Fraction(part_of_gain(bounds[pair.first], bounds.get(pair.second, AT_REST)))
 
 
+@per_trace
 def guarantees(trace: Trace) -> list[Guarantee]:
     """The promised distance of each pair that comes near."""
     # Other pairs stay so far apart that the longest steps of both could not break their distance.
-    return trace.derived("guarantees", lambda: list(_guarantees(trace)))
+    return list(_guarantees(trace))
 
 
 def _guarantees(trace: Trace) -> Iterator[Guarantee]:
     samples, last = period_ends(trace), last_period(trace)
     places = {name: trace.position(name)[samples] for name in trace.robots}
     longest = {name: _longest(way, float(last)) for name, way in places.items()}
-    pairs, of_law, bounds = pairs_of(trace), _gain(trace), bounds_of(trace)
+    pairs, bounds = pairs_of(trace), bounds_of(trace)
     reach = np.array([pair.law_m + longest[pair.first] + longest.get(pair.second, 0.0) for pair in pairs])
     reach += [_unsure_m(trace, pair) if pair.asynchronous else 0.0 for pair in pairs]
     beyond = SCREEN_M + np.array([pair.cover_m for pair in pairs])  # of the bodies from the points that are steered
@@ -300,7 +302,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
         first = places[pair.first][there]
         beside = _beside(trace, pair, places, there, float(reach[k]))
         both = bounds[pair.first], bounds.get(pair.second, AT_REST)
-        gain = of_law * Fraction(part_of_gain(*both))
+        gain = _gain(trace, pair)
         asked = Fraction(pair.share), gain, last if end == len(samples) else Fraction(1)
         seen = partial(_seen, trace, pair, there) if pair.error_m or part_of_gain(*both) < 1.0 else None
         missed = [
@@ -323,7 +325,7 @@ def _guarantees(trace: Trace) -> Iterator[Guarantee]:
                 points = nextafter(pair.law_m - rounded_up(lost) - pair.views_m, -inf)
                 kept = kept_distance(points, *both, gain=trace.scenario.control.avoidance_gain_1_s) - pair.radii_m
                 gap, why = min(gap, kept), "" if isfinite(kept) else "the steered points came too near"
-        yield Guarantee(pair, missed_m, rounded_up(short), gap, why)
+        yield Guarantee(pair, missed_m, gap, why)
 
 
 def _unsure_m(trace: Trace, pair: Pair) -> float:
@@ -341,8 +343,8 @@ def _of_old_positions(trace: Trace, pair: Pair) -> Guarantee:
     short = shortage(places[0], places[1], pair.law_m)
     lost = sum(map(Fraction, missed.tolist()), short)
     if lost > Fraction(pair.law_m) / 2:
-        return Guarantee(pair, missed, rounded_up(short), -inf, "the steps miss half of the distance in all")
-    return Guarantee(pair, missed, rounded_up(short), -rounded_up(lost - Fraction(pair.required_m)))
+        return Guarantee(pair, missed, -inf, "the steps miss half of the distance in all")
+    return Guarantee(pair, missed, -rounded_up(lost - Fraction(pair.required_m)))
 
 
 def _seen(trace: Trace, pair: Pair, there: slice, place: Array) -> list[tuple[Array, Array]]:
@@ -386,10 +388,10 @@ def _longest(places: Array, last: float) -> float:
 
 def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]:
     """The lost distance, m, because a sample violates the inequalities."""
-    t, bounds = trace.sampled("t_s"), bounds_of(trace)
+    t = trace.sampled("t_s")
     for promised in kept:
         pair, missed_m = promised.pair, promised.missed_m
-        gain = float(_gain(trace)) * part_of_gain(bounds[pair.first], bounds.get(pair.second, AT_REST))
+        gain = float(_gain(trace, pair))
         lost = np.maximum(missed_m / gain - pair.drift_m, 0.0) if gain else missed_m * len(t)
         lost = np.cumsum(missed_m) if pair.asynchronous else lost
         about = {"first": pair.first, "second": pair.second}
@@ -398,16 +400,21 @@ def _avoidance(trace: Trace, kept: Sequence[Guarantee]) -> Iterator[_Hypothesis]
 
 def _beside_moving(trace: Trace) -> Iterator[_Hypothesis]:
     """Beside obstacles that may move: the passive law, and their declared speeds."""
-    period_s, ends = trace.scenario.control.period_s, period_ends(trace)
+    t, period_s = trace.sampled("t_s"), trace.scenario.control.period_s
     for periods in beside(trace):
         about = {"first": periods.pair.first, "second": periods.pair.second}
         yield _Hypothesis(PASSIVE, "m", trace.t[periods.row], 0.0 - periods.missed_m, DISTANCE_TOLERANCE_M, about)
     for name, speed in speeds(trace).items():
         spare = trace.scenario.barriers[name].expected_speed_m_s - speed
-        yield _Hypothesis(DECLARED, "m/s", trace.t[ends[:-1]], spare, DISTANCE_TOLERANCE_M / period_s, {"other": name})
-        place = trace.position(name)
-        off = np.linalg.norm(place - interpolate(trace.t[ends], place[ends], trace.t), axis=1)
-        yield _Hypothesis("straight motion", "m", trace.t, 0.0 - off, DISTANCE_TOLERANCE_M, {"other": name})
+        yield _Hypothesis(DECLARED, "m/s", t, spare, DISTANCE_TOLERANCE_M / period_s, {"other": name})
+        yield _straight(trace, name, {"other": name})
+
+
+def _straight(trace: Trace, name: str, about: dict[str, Any]) -> _Hypothesis:
+    """A steered point or an obstacle moves straight between control samples."""
+    ends, place = period_ends(trace), trace.position(name)
+    off = np.linalg.norm(place - interpolate(trace.t[ends], place[ends], trace.t), axis=1)
+    return _Hypothesis("straight motion", "m", trace.t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
 
 
 def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
@@ -465,14 +472,12 @@ def _sampled(trace: Trace) -> Iterator[_Hypothesis]:
     robots = trace.scenario.robots
     t = trace.t
     samples = trace.sample_rows
-    spacing = np.diff(np.append(t[samples], t[-1]))
+    spacing = np.diff(t[period_ends(trace)])
     yield _Hypothesis("sampling", "s", t[samples], period - spacing, TIME_TOLERANCE_S, {})
-    ends = np.append(samples, len(t) - 1)
     for robot in trace.robots:
         place, about = trace.position(robot), {"robot": robot}
-        off = np.linalg.norm(place - interpolate(t[ends], place[ends], t), axis=1)
         if not trace.plant(robot).measured:  # the cover of such a robot is from the straight line
-            yield _Hypothesis("straight motion", "m", t, 0.0 - off, DISTANCE_TOLERANCE_M, about)
+            yield _straight(trace, robot, about)
         spare = robots[robot].max_speed_m_s - np.linalg.norm(trace.command(robot)[1:], axis=1)
         yield _Hypothesis("speed limit", "m/s", t[:-1], spare, VELOCITY_TOLERANCE_M_S, about)
         if trace.scenario.position_error_m or (trace.scenario.sensing and not trace.scenario.announces):

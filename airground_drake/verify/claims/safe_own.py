@@ -91,8 +91,7 @@ def _margins(trace: Trace) -> Iterator[OwnMargin]:
         for robot in (name for name in (pair.first, pair.second) if name in trace.robots):
             if least > max(pair.keeps_m(period) - pair.cover_m, pair.safe_m) + longest[robot]:
                 continue
-            other = pair.second if robot == pair.first else pair.first
             margins = own_margins(trace, pair, robot).least
             k = int(np.argmin(margins))  # the first one that is not a number, if any
             if margins[k] != np.inf:
-                yield OwnMargin(robot, other, float(margins[k]), float(trace.t[k + 1]))
+                yield OwnMargin(robot, pair.other(robot), float(margins[k]), float(trace.t[k + 1]))

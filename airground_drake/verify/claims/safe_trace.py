@@ -77,16 +77,17 @@ class SafeTrace(TraceClaim):
         worst = min(listed, key=lambda distance: distance.margin_m)
         safe = worst.margin_m >= -DISTANCE_TOLERANCE_M
         both = (worst.first, worst.second)
+        at_map = place_on_map(trace, worst.first, worst.t_s) if worst.second == MAP else {}
         against: dict[str, Any] | None = None
         if not safe:
             why = next(encounter.cause(trace) for encounter in encounters(trace) if encounter[:2] == both)
-            against = asdict(worst) | _place(trace, worst) | {"why": why} | snapshot(trace, both, worst.t_s)
+            against = asdict(worst) | at_map | {"why": why} | snapshot(trace, both, worst.t_s)
         return Finding(
             "holds" if safe else "refuted",
             margin=worst.margin_m,
             unit="m",
             quantity="least distance of a pair less its safe distance",
-            where={"first": worst.first, "second": worst.second, "t_s": worst.t_s, **_place(trace, worst)},
+            where={"first": worst.first, "second": worst.second, "t_s": worst.t_s, **at_map},
             counterexample=against,
             evidence={
                 "pairs": [asdict(distance) for distance in listed],
@@ -119,8 +120,3 @@ def _entry(trace: Trace, k: int) -> Distance:
     pair, gap_m, margin_m, t_s, row = least_gap(trace, pairs_of(trace)[k])
     near = margin_m < pair.reach_m or (pair.more_m > 0.0 and steered_margin(trace, pair) < pair.reach_m)
     return Distance(pair.first, pair.second, pair.required_m, gap_m, margin_m, t_s, row, near)
-
-
-def _place(trace: Trace, worst: Distance) -> dict[str, list[float]]:
-    """The place on the map, for pairs with the map."""
-    return place_on_map(trace, worst.first, worst.t_s) if worst.second == MAP else {}

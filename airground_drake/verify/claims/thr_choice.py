@@ -99,7 +99,7 @@ class ThrChoice(ModelClaim):
         }
 
     def with_runs(self, finding: Finding, seen: Sequence[dict[str, Row]]) -> Finding:
-        if not (isinstance(finding.evidence, dict) and "extra_risk" in finding.evidence):
+        if "extra_risk" not in finding.evidence:
             return finding
         runs = {name: row for of_run in seen for name, row in of_run.items()}
         return replace(finding, evidence=finding.evidence | {"runs": runs})

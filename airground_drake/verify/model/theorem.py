@@ -41,11 +41,6 @@ def grounds(theorems: Sequence[str], hypotheses: Sequence[Hypothesis]) -> dict[s
     return evidence if stands.checked else evidence | {"reason": f"the theorems are {stands.words}"}
 
 
-def is_proof(evidence: Any) -> bool:
-    """Whether evidence is that of theorems, not a failure's."""
-    return isinstance(evidence, dict) and "proof" in evidence
-
-
 class TheoremClaim(ModelClaim):
     """A theorem and its hypotheses.
 
@@ -66,7 +61,7 @@ class TheoremClaim(ModelClaim):
 
     def with_runs(self, finding: Finding, seen: Sequence[tuple[int, int]]) -> Finding:
         """Add how often the runs met the premise: a theorem that never applies protects nothing."""
-        if not seen or not is_proof(finding.evidence):
+        if not seen or "proof" not in finding.evidence:
             return finding
         met, cases = (sum(column) for column in zip(*seen, strict=True))
         return replace(finding, evidence=finding.evidence | {"applies_to": met, "of": cases})

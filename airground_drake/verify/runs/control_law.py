@@ -9,7 +9,7 @@ import numpy as np
 
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.scenario.schema import Control
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.engines.shortfalls import demanded
 from airground_drake.verify.runs.old_positions import heard_places, unsure_m
 from airground_drake.verify.runs.pairs import contacts, is_planar, pairs_beside, parts_of
@@ -25,16 +25,21 @@ class Inequalities(NamedTuple):
     # Sorted by control sample, then in the order of the controller: barriers at rest, robots, barriers that move.
 
     sample: Indices  # number of the control sample, (C,)
-    # What is avoided, (C,): the number of a part in `pairs.parts_of`, or that of a robot after all parts.
-    column: Indices
+    column: Indices  # what is avoided, (C,): its number in `avoided`
     normal: Array  # (C, 3)
     distance: Array  # distance from the avoided body, or from its last known position, (C,), m
     bound: Array  # (C,), m/s
-    retreat: Array  # n.v at which the robot should retreat, (C,), m/s, a task below all inequalities; 0: it need not
 
     def slack(self, velocity: Array) -> Array:
         """Slack of the velocities at the control samples, (S, 3), in each inequality, (C,), m/s."""
         return np.asarray(np.einsum("cd,cd->c", self.normal, velocity[self.sample]) - self.bound)
+
+
+@per_trace
+def avoided(trace: Trace) -> list[str]:
+    """The bodies that robots avoid: for each part in `pairs.parts_of` its barrier, then the robots."""
+    parts = parts_of(trace)
+    return [*(parts.names[owner] for owner in parts.owner.tolist()), *trace.robots]
 
 
 def least_speeds(distance: Array, safe: Array, share: Array, control: Control, speed: Array | float = 0.0) -> Array:
@@ -46,11 +51,6 @@ def least_speeds(distance: Array, safe: Array, share: Array, control: Control, s
     bound = share * demanded(safe - distance, control.avoidance_gain_1_s, 1.0 / period)
     passive = np.minimum(-(distance - safe - speed * period) / period, 0.0)
     return np.where(distance <= control.sensing_range_m, np.where(np.asarray(speed) > 0.0, passive, bound), -np.inf)
-
-
-def retreats(distance: Array, safe: Array, speed: Array, period_s: float) -> Array:
-    """Speeds n.v, (...), m/s, at which a robot should retreat from bodies that may move: V - (D - d) / h, or 0."""
-    return np.where(speed > 0.0, np.maximum(speed - (distance - safe) / period_s, 0.0), 0.0)
 
 
 def _towards_unsure(
@@ -101,7 +101,6 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     normal *= PLANE if planar else 1.0
     distance = np.append(near.away.distance, apart)
     bound = least_speeds(distance, safe, share, control, speed)
-    retreat = retreats(distance, safe, speed, control.period_s)
     when = np.append(near.place, sample)
     number = np.array([trace.robots.index(name) for name in others], dtype=np.intp)
     column = np.append(near.core, len(parts.owner) + number[other])
@@ -109,8 +108,8 @@ def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequ
     if unsure.any():
         excess = distance - safe - np.where(speed > 0.0, speed * control.period_s, unsure)
         k, normal, bound = _towards_unsure(normal, bound, distance, excess, unsure, control.period_s, planar=planar)
-        when, column, distance, retreat = when[k], column[k], distance[k], retreat[k]
+        when, column, distance = when[k], column[k], distance[k]
     moves = np.array([trace.scenario.barriers[name].moves is not None for name in parts.names], dtype=np.bool_)
     rank = np.concatenate([np.where(moves[parts.owner], 2, 0), np.ones(len(trace.robots), dtype=np.intp)])
     order = np.lexsort([column, rank[column], when])
-    return Inequalities(when[order], column[order], normal[order], distance[order], bound[order], retreat[order])
+    return Inequalities(when[order], column[order], normal[order], distance[order], bound[order])

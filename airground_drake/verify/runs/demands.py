@@ -12,7 +12,7 @@ import numpy as np
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.engines.outlines import CORNERS, COUNT, EXTENT, MIDDLE, unpacked
-from airground_drake.verify.runs.control_law import ON_TOP
+from airground_drake.verify.runs.control_law import ON_TOP, PLANE
 from airground_drake.verify.runs.old_positions import unsure_s
 from airground_drake.verify.runs.pairs import carried, declared_pairs, pairs_beside, parts_of
 
@@ -20,7 +20,6 @@ NO_INTERVENTION = "a"  # method without interventions
 # Parameters that are outlines: of what is at rest, and of what moves, about its origin.
 OUTLINES = ("outlines", "moving_outlines")
 SAME_M = 1e-12  # distances that differ by no more are equal, m: two ways to add up a budget round differently
-PLANAR, SPATIAL = (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)  # directions in which UGVs and UAVs move
 
 
 def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
@@ -68,7 +67,7 @@ def demanded(trace: Trace) -> dict[str, dict[str, Any]]:
             "others": carrier[beside[:, m:] - m].ravel(),
             "safe_m": np.take_along_axis(safe[team], beside, axis=1).ravel(),
             "share": np.take_along_axis(share[team], beside, axis=1).ravel(),
-            "mobility": np.array([SPATIAL if with_uav[i] else PLANAR for i in team]).ravel(),
+            "mobility": np.concatenate([np.ones(3) if with_uav[i] else PLANE for i in team]),
             "max_speed_m_s": np.array([scenario.robots[robots[i]].max_speed_m_s for i in team]),
             "sampling_s": np.array([control.period_s, 0.0]),
             "gain_1_s": control.avoidance_gain_1_s,

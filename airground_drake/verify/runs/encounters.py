@@ -12,8 +12,8 @@ import numpy as np
 
 from airground_drake.base.arrays import Array, Indices
 from airground_drake.sim.trace import Trace, per_trace
-from airground_drake.verify.engines.outlines import Cores, apart_by_blocks, away_from, least_distances, over_time
-from airground_drake.verify.runs.control_law import Inequalities, inequalities_of
+from airground_drake.verify.engines.outlines import apart_by_blocks, away_from, least_distances, over_time
+from airground_drake.verify.runs.control_law import Inequalities, avoided, inequalities_of
 from airground_drake.verify.runs.pairs import (
     BENT_M,
     CENTRE,
@@ -31,7 +31,7 @@ from airground_drake.verify.runs.pairs import (
     off_m_of,
     origin_of,
     pairs_of,
-    parts_of,
+    steered,
 )
 from airground_drake.verify.runs.passive import AT_LIMIT_M_S, STANDING_M_S, Periods, periods_of
 
@@ -75,7 +75,7 @@ class OwnMargins(NamedTuple):
 
 def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     """A robot's margins by its own motion, with the other body held at its position of the control sample."""
-    other = pair.second if robot == pair.first else pair.first
+    other = pair.other(robot)
     rows = np.arange(len(trace.t) - 1)
     sample = samples_before(trace)
     cores = cores_of(trace).get(other, CENTRE)
@@ -98,8 +98,9 @@ def own_margins(trace: Trace, pair: Pair, robot: str) -> OwnMargins:
     near = there & ((at_sample <= keeps + step) | broken)
     start, end = (place[rows[near] + k] - origin[sample[near]] for k in (0, 1))
     least = least_distances(beside, start, end, planar=planar)[0].min(axis=0, initial=np.inf) - off_m
-    steered = _steered(trace, pair, robot, beside, sample[near]) - pair.cover_m
-    of_law = np.minimum(np.minimum(steered, at_sample[near]), keeps)
+    points = (trace.position(robot) - steered(trace, other))[sample[near]]
+    of_points = away_from(beside, points, planar=planar).distance.min(axis=0) - pair.cover_m
+    of_law = np.minimum(np.minimum(of_points, at_sample[near]), keeps)
     of_body = np.where(broken[near], np.minimum(at_sample[near], pair.safe_m), -np.inf)
     due = np.maximum(of_law, of_body)
     for k in np.flatnonzero(least < due).tolist() if off_m else ():
@@ -115,14 +116,6 @@ def _first_apart(pair: Pair, gaps: Array) -> int:
     """The first row at which an existing pair has its distance; without one, the number of rows."""
     apart = np.flatnonzero(gaps[pair.row :] >= pair.required_m - DISTANCE_TOLERANCE_M)
     return pair.row + int(apart[0]) if len(apart) else len(gaps)
-
-
-def _steered(trace: Trace, pair: Pair, robot: str, beside: Cores, rows: Indices) -> Array:
-    """Distances of the steered points of a pair, or of one from the cores of an obstacle, at some rows, m."""
-    other = pair.second if robot == pair.first else pair.first
-    origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
-    away = away_from(beside, (trace.position(robot) - origin)[rows], planar=is_planar(trace, robot))
-    return np.asarray(away.distance.min(axis=0))
 
 
 class Encounter(NamedTuple):
@@ -218,12 +211,9 @@ def _whose_doing(trace: Trace, least: Gap) -> str:
 def _steered_nearer(trace: Trace, pair: Pair, robot: str) -> bool:
     """Whether commands led a robot's steered point closer than the law allows (the body follows later)."""
     rows = trace.sample_rows[(trace.sample_rows >= pair.row) & (trace.sample_rows <= pair.last)]
-    other = pair.second if robot == pair.first else pair.first
-    origin = trace.position(other) if other in trace.robots else origin_of(trace, other)
-    cores, planar = cores_of(trace).get(other, CENTRE), is_planar(trace, robot)
-    before, after = (
-        over_time(cores, trace.position(robot)[at] - origin[rows[:-1]], planar=planar) for at in (rows[:-1], rows[1:])
-    )
+    place, origin = trace.position(robot), steered(trace, pair.other(robot))[rows[:-1]]
+    cores, planar = cores_of(trace).get(pair.other(robot), CENTRE), is_planar(trace, robot)
+    before, after = (over_time(cores, place[at] - origin, planar=planar) for at in (rows[:-1], rows[1:]))
     keeps_m = pair.keeps_m(trace.scenario.control.period_s)
     return bool((after < np.minimum(before, keeps_m) - DISTANCE_TOLERANCE_M).any())
 
@@ -282,8 +272,6 @@ def _blocked_by(trace: Trace, pair: Pair, periods: Periods, k: int, given: Inequ
     retreat = wished * periods.normal[k]
     of_sample = np.flatnonzero(given.sample == sample)
     missed = given.normal[of_sample] @ retreat < given.bound[of_sample] - BLOCKED_M_S
-    parts = parts_of(trace)
-    columns = given.column[of_sample[missed]].tolist()
-    m = len(parts.owner)
-    names = [parts.names[parts.owner[c]] if c < m else trace.robots[c - m] for c in columns]
-    return [name for name in dict.fromkeys(names) if name != pair.second]
+    bodies = avoided(trace)
+    names = dict.fromkeys(bodies[column] for column in given.column[of_sample[missed]].tolist())
+    return [name for name in names if name != pair.second]

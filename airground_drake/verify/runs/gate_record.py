@@ -14,7 +14,7 @@ import numpy as np
 from airground_drake.base.arrays import Array
 from airground_drake.base.errors import TraceError
 from airground_drake.sim.tables import PROBLEM_ARRAYS, PROBLEM_SCALARS
-from airground_drake.sim.trace import Trace
+from airground_drake.sim.trace import Trace, per_trace
 from airground_drake.verify.claim import TraceClaim
 from airground_drake.verify.finding import Finding
 from airground_drake.verify.runs.control_law import ON_TOP
@@ -130,6 +130,7 @@ class DecisionRecord:
         return max(LEAST_COST, float(self.cost(self.constant).min()))
 
 
+@per_trace
 def rows_of(trace: Trace) -> list[DecisionRecord]:
     """All decisions, with their problems (26); method (d) has no problems."""
     given = [{str(name): value for name, value in row.items()} for row in trace.decisions.to_dict("records")]
@@ -250,7 +251,7 @@ class GateClaim(TraceClaim):
         if without and not len(trace.decisions):
             reason = f"{', '.join(without)}: in mode 'intervening', but the trace has no decision"
             return Finding("not_run", evidence={"reason": reason, "faults": trace.meta["faults"]})
-        rows = trace.derived("rows", lambda: rows_of(trace))
+        rows = rows_of(trace)
         if not rows:
             reason = "no UGV had a proposal for long enough: nothing to decide"
             return Finding("holds", evidence={"decisions": 0, "reason": reason}, exercised=0)

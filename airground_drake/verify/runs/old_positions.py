@@ -15,11 +15,10 @@ from airground_drake.base.exact import decimal
 from airground_drake.scenario.schema import Scenario
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claim import TIME_TOLERANCE_S
-from airground_drake.verify.engines.shortfalls import SCREEN_M, rounded_up
+from airground_drake.verify.engines.shortfalls import BITS, SCREEN_M, rounded_up
 from airground_drake.verify.runs.passive import last_period, period_ends
 
 SPARE_S = 1e-8  # time by which the law overestimates the age of positions, beyond the theorem's requirement
-BITS = 160  # lengths are enclosed to 2^-160 of their denominator
 
 
 def unsure_s(scenario: Scenario) -> float:

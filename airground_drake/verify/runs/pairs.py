@@ -59,8 +59,6 @@ class Pair(NamedTuple):
     error_m: float = 0.0  # sum of the bounds of the errors of the measured positions
     asynchronous: bool = False  # whether each of two UGVs acts on an old position of the other one
     slip_m: float = 0.0  # how much of its command the robot may miss in a control period
-    # How far a robot that never drives backwards is behind its steered point, beside a barrier at rest.
-    drawn_m: float = 0.0
     # Duration of commands already given, where the theorem requires a safe start of the bodies, too (they lag, are late
     # or follow the steered point as a trailer); None where it does not.
     under_way_s: float | None = None
@@ -68,6 +66,10 @@ class Pair(NamedTuple):
     @property
     def rows(self) -> slice:
         return slice(self.row, self.last + 1)
+
+    def other(self, robot: str) -> str:
+        """The body that this robot of the pair must avoid."""
+        return self.second if robot == self.first else self.first
 
     @property
     def safe_m(self) -> float:
@@ -125,8 +127,8 @@ def pairs_by(
         row, last = there.get(second, (0, end))
         safe = given.required_m + sum(given.radii_m)
         part, views_m = part_of_gain(own, other), float(of_views(safe, own, other, gain=gain))
-        drawn = own.cover_m if own.drawn and second in there and not passive else 0.0
-        needs_start = drawn or (not passive and (own.late or other.late))
+        drawn = own.drawn and own.cover_m > 0.0 and second in there
+        needs_start = not passive and (drawn or own.late or other.late)
         yield Pair(
             first, second, given.required_m, sum(given.radii_m), share, reach, row, last, speed,
             more_m=float(law_distance(safe, own, other, gain=gain, passive=passive)) - safe,
@@ -136,7 +138,6 @@ def pairs_by(
             error_m=own.error_m + other.error_m,
             asynchronous=given.kind == ASYNCHRONOUS,
             slip_m=own.drift_m_s * period,
-            drawn_m=drawn,
             under_way_s=max(own.delay_s, other.delay_s) if needs_start else None,
         )  # fmt: skip
 
@@ -182,6 +183,11 @@ def origin_of(trace: Trace, name: str) -> Array:
     if name in trace.robots or trace.scenario.barriers[name].moves:
         return trace.body(name)
     return np.broadcast_to(0.0, (len(trace.t), 3))
+
+
+def steered(trace: Trace, name: str) -> Array:
+    """Where the steered point of a robot or the origin of a barrier's parts is at the rows, (T, 3), m."""
+    return trace.position(name) if name in trace.robots else origin_of(trace, name)
 
 
 def seen_from(trace: Trace, robot: str, other: str) -> Array:
@@ -276,8 +282,7 @@ def at_appearance(trace: Trace, gap: Gap) -> bool:
 def steered_margin(trace: Trace, pair: Pair) -> float:
     """The least distance of a pair's steered points minus the law's distance, m."""
     cores = cores_of(trace).get(pair.second, CENTRE)
-    second = trace.position(pair.second) if pair.second in trace.robots else origin_of(trace, pair.second)
-    way = (trace.position(pair.first) - second)[pair.rows]
+    way = (trace.position(pair.first) - steered(trace, pair.second))[pair.rows]
     return closest(cores, way, planar=is_planar(trace, pair.first)).distance - pair.law_m
 
 
@@ -290,10 +295,11 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
     lower = least_distances(beside, way[:-1], way[1:], planar=planar)[0].min(axis=0) - off_m
     most = min(ceil((off_m / BENT_M) ** 0.5), MOST_PARTS)
     t = trace.t[pair.rows]
-    approaches = list[Approach]()
+    far = np.where(lower < pair.safe_m, inf, lower)  # these segments need not be divided
+    k = int(far.argmin())
+    best = Approach(float(far[k]), float(t[k]), k + 1)
     for k in sorted(np.flatnonzero(lower < pair.safe_m).tolist(), key=lower.__getitem__):
-        best = min(approaches).distance_m if approaches else inf
-        if lower[k] > best:
+        if lower[k] > best.distance_m:
             break
         for parts in (min(FEW_PARTS, most), most):  # a few suffice to exclude most segments
             shares = np.linspace(0.0, 1.0, parts + 1)
@@ -305,15 +311,11 @@ def _least_of_bent(trace: Trace, pair: Pair, off_m: float) -> Approach:
             nearest = Approach(
                 float(least[j]) - off_m / parts**2, instant_of(t, k + 1, (j + float(where[j])) / parts), k + 1
             )
-            if nearest.distance_m > best:
+            if nearest.distance_m > best.distance_m:
                 break
         else:
-            approaches.append(nearest)
-    rest = np.delete(lower, np.flatnonzero(lower < pair.safe_m))
-    if len(rest):
-        k = int(np.flatnonzero(lower == rest.min())[0])
-        approaches.append(Approach(float(rest.min()), float(t[k]), k + 1))
-    return min(approaches)
+            best = min(best, nearest)
+    return best
 
 
 def bent(trace: Trace, name: str, row: int, shares: Array) -> Array:

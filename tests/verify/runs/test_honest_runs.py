@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.edits import with_meta, with_scenario
-from builders.runs import at_rest, refractory
+from builders.runs import at_rest, refractory, run_of
 from builders.scenarios import STILL, changed, lone
 from builders.simulation import simulate as simulate_synthetic
 from verify.judging import decided
@@ -14,6 +14,7 @@ from verify.judging import decided
 from airground_drake.scenario.schema import Decision, Preset, Threshold
 from airground_drake.sim.trace import Trace
 from airground_drake.verify.claims.thr_quality import Judge, Watch
+from airground_drake.verify.claims.zeno_trace import ZenoTrace
 from airground_drake.verify.engines.geometry import NormSignal
 
 
@@ -31,6 +32,12 @@ def test_a_crossing_inside_the_dwell_triggers_at_its_end(noise: float) -> None:
     assert held("THR-TRIG", trace)
     assert set(trace.column("ugv1.mode")) == {0.0, 1.0, 2.0}
     assert decided("ZENO-TRACE", trace).margin == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_most_triggers_of_a_run_are_counted_in_decimals() -> None:
+    """In floating point 7 / 0.07 is a little less than 100."""
+    trace = with_scenario(run_of("d"), duration_s=7.0, decision__min_inter_event_s=0.07)
+    assert ZenoTrace().check(trace).evidence["most_triggers_possible"] == 101
 
 
 def test_above_the_threshold_at_the_start_triggers_at_once() -> None:

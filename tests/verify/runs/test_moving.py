@@ -7,6 +7,7 @@ import pandas as pd
 import persons
 import pytest
 from builders.edits import with_scenario, with_table
+from oracles.control_law import retreats
 from persons import RADII, D, H
 from verify.judging import decided
 
@@ -18,7 +19,7 @@ from airground_drake.verify.claims.safe_hyp import DECLARED, PASSIVE
 from airground_drake.verify.judging import judge_all
 from airground_drake.verify.pair_kinds import SHARES, kind_of
 from airground_drake.verify.runs import encounters as encounters_module
-from airground_drake.verify.runs.control_law import least_speeds, retreats
+from airground_drake.verify.runs.control_law import least_speeds
 from airground_drake.verify.runs.encounters import steps_of
 from airground_drake.verify.runs.pairs import gap_over_time, least_gap, pair_of
 from airground_drake.verify.runs.passive import periods_of
