@@ -96,10 +96,22 @@ class SafeDist(TheoremClaim):
         ]
         if gain <= 0:
             return stability
-        return stability + [
+        left = [
             Hypothesis.of(self.margin_of, f"{pair.kind}: d - W/A is above 0", left_m(inputs, pair), "m", strict=True)
             for pair in kinds_of(inputs)
         ]
+        ranges = [
+            Hypothesis.of(
+                "sensing range less d - W/A + (c + W) h",
+                f"{pair.kind}: the sensing range is at least d - W/A and what the two approach each other in a period",
+                decimal(inputs["sensing_range_m"])
+                - left_m(inputs, pair)
+                - (pair.closing_m_s + disturbance_m_s(inputs, pair)) * h,
+                "m",
+            )
+            for pair in kinds_of(inputs)
+        ]
+        return stability + left + ranges
 
     def numbers(self, inputs: dict[str, Any]) -> dict[str, Any]:
         if not inputs["avoidance_gain_1_s"] > 0.0:
@@ -129,8 +141,12 @@ class SafeDist(TheoremClaim):
         return replace(finding, evidence=finding.evidence | periods)
 
 
+def disturbance_m_s(inputs: dict[str, Any], pair: PairKind) -> Fraction:
+    """W: what the disturbances of a pair add up to, m/s."""
+    return (1 if pair.kind == "obstacle" else 2) * decimal(inputs["disturbance_m_s"])
+
+
 def left_m(inputs: dict[str, Any], pair: PairKind) -> Fraction:
     """d - W/A, m; with A/2 between UGVs if one may stand because it misses a message."""
-    disturbed = 1 if pair.kind == "obstacle" else 2
     halved = 2 if pair.kind == "ugv_ugv" and inputs.get("ugvs_may_stand") else 1
-    return pair.safe_m - disturbed * halved * decimal(inputs["disturbance_m_s"]) / decimal(inputs["avoidance_gain_1_s"])
+    return pair.safe_m - halved * disturbance_m_s(inputs, pair) / decimal(inputs["avoidance_gain_1_s"])

@@ -120,7 +120,7 @@ Definition meets i j k := exists w y n,
   norm (sub w (relative i j (sample k))) <= err i j /\ nearest (inside i j) w y n /\
   bound h A (dlaw i j) (norm (sub w y)) - short i j <= dot n (u i k) - dot n (u j k).
 Definition far i j k :=
-  holds i j (dlaw i j + (norm (u i k) + drift i + norm (u j k) + drift j) * h) (sample k).
+  holds i j (kept i j + (norm (u i k) + drift i + norm (u j k) + drift j) * h) (sample k).
 Definition stand i j k := forall s, 0 <= s <= h -> moved i k s = moved j k s.
 (** The law is asked for only while the distance is kept, so that [short] may be computed from it. *)
 Hypothesis law : forall i j k, sampled k -> apart i j -> holds i j (kept i j) (sample k) ->
@@ -175,7 +175,7 @@ Proof.
       assert (s * (short i j + drift i + drift j) <= s * loss i j) by (apply Rmult_le_compat_l; lra); lra. }
     split; [| intros ->]; intros c Hc; specialize (R c Hc); lra.
   - assert (R : forall c, inside i j c -> m - f <= norm (sub (relative i j (sample k + s)) c)).
-    { intros c Hc; specialize (F c Hc); fold g in F; rewrite X.
+    { intros c Hc; specialize (F c Hc); fold m g in F; rewrite X.
       set (o := add (scale s (sub (u i k) (u j k))) (sub di dj)).
       pose proof (nearly (sub (add g o) c) (sub g c)) as T.
       replace (sub (sub (add g o) c) (sub g c)) with o in T by (destruct g, o, c; vectors; f_equal; ring).
@@ -184,7 +184,6 @@ Proof.
         pose proof (norm_difference (u i k) (u j k)); pose proof (norm_difference di dj); fold o in T1; nra. }
       pose proof (norm_nonneg (u i k)); pose proof (norm_nonneg (u j k)).
       pose proof (drift_nonneg i k Hk); pose proof (drift_nonneg j k Hk).
-      assert (0 <= loss i j / A) by (apply Rle_mult_inv_pos; lra).
       set (v := norm (u i k) + drift i + norm (u j k) + drift j) in *.
       assert (v * s <= v * h) by (apply Rmult_le_compat_l; unfold v; lra); unfold v in *; lra. }
     split; [| intros _]; intros c Hc; specialize (R c Hc); lra.
@@ -197,7 +196,7 @@ Qed.
 (** THEOREM (7)-(8), (11): At every sample the points that the law steers keep its distance d_law, but for eps and W/A.
     - The product of gain and control period, A h, is at most 1: min(A h, 1) stands for it (Safety.capped).
     - At every sample the pair meets the law, up to a slack, with a relative position that is measured up to eps; or it
-      is far apart, or stands.
+      is too far apart to come below d_law - eps - W/A before the next sample, or stands.
     - W is at least the slacks and drifts of the two; dips and covers are what the plants have at most (Mixed).
     - eps (1 - A h) <= A h (d_law - eps - W/A), and eps is below d_law - eps - W/A.
     - The pair starts at d_law - eps - W/A or farther (Budget.measured_start).

@@ -235,7 +235,11 @@ Proof.
     set (p := row (track_of r i) k) in *; set (p' := row (track_of r i) (S k)) in *.
     set (o := row (track_of r j) k) in *; set (o' := row (track_of r j) (S k)) in *.
     set (x := minus p o) in *; destruct (is_far _ _) eqn:F; [right; left | left].
-    + apply far_sound in F; rewrite !plus_IZR in F; apply clear_points; rewrite !norm_scale by lra.
+    + assert (Less : kept_by n <= IZR q / IZR (unit r)).
+      { assert (0 <= loss n / gain n) by (apply Rle_mult_inv_pos; [exact E0 | apply G]).
+        unfold kept_by; simpl dlaw; simpl err; lra. }
+      apply far_sound in F; rewrite !plus_IZR in F; apply clear_points; rewrite !norm_scale by lra.
+      apply Rle_trans with (1 := Rplus_le_compat_r _ _ _ Less).
       replace (IZR q / IZR (unit r)) with (/ IZR (unit r) * IZR q) by (field; lra).
       rewrite !Rplus_0_r, Rmult_1_r, <- !Rmult_plus_distr_l; apply Rmult_le_compat_l; lra.
     + apply meets_law_sound in St; try assumption; destruct St as [Pos M].

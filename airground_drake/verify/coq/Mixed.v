@@ -153,7 +153,7 @@ Definition kept_by n := dlaw n - err n - loss n / gain n.
 Definition pair_law i j inside n k :=
   (exists w y m, norm (sub w (apart i j (sample k))) <= err n /\ nearest inside w y m /\
     bound h (gain n) (dlaw n) (norm (sub w y)) - short n <= dot m (command i k) - dot m (command j k)) \/
-  clear inside (dlaw n + (norm (command i k) + drift i + norm (command j k) + drift j) * h) (apart i j (sample k)) \/
+  clear inside (kept_by n + (norm (command i k) + drift i + norm (command j k) + drift j) * h) (apart i j (sample k)) \/
   (forall s, 0 <= s <= h ->
     steered i (sample k + s) = steered i (sample k) /\ steered j (sample k + s) = steered j (sample k)).
 

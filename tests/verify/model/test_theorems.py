@@ -70,6 +70,8 @@ GAINED = (*LAYER, "SAFE-DIST")
         (["SAFE-GATE"], {"intervention_on_top": True}, "inconclusive"),
         (["SAFE-DIST"], {"avoidance_gain_1_s": 0.0}, "inconclusive"),
         (["SAFE-DIST"], {"disturbance_m_s": 3.0}, "inconclusive"),
+        (["SAFE-DIST"], {"sensing_range_m": 2.04, "pairs": pair("obstacle", 2.0, 5.1)}, "inconclusive"),
+        (["SAFE-DIST"], {"sensing_range_m": 2.0425, "pairs": pair("obstacle", 2.0, 5.1)}, "proved"),  # 1.75 + 5.85 h
         (["LIVE-GATE", "LIVE-WAIT"], {"longest_s": 0.0}, "inconclusive"),
         (["LIVE-GATE", "LIVE-WAIT"], {"period_s": 0.0}, "inconclusive"),
         (["ZENO-PROOF"], {"released_below_m": 3.0}, "proved"),
