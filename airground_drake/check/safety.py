@@ -243,7 +243,7 @@ def measured_shortfall_m(run: Run, law: Pair, rows: Rows, gain: Fraction, last: 
         for by in measuring
     ]
     own_step, other_step = np.diff(own_m, axis=0), np.diff(other_m, axis=0)
-    step, moves = own_step - other_step, own_step.any(axis=1) | other_step.any(axis=1)
+    step, moves = own_step - other_step, np.logical_or(own_step.any(axis=1), other_step.any(axis=1))
     lasts, lacks = [Fraction(1)] * (len(step) - 1) + [last], Fraction()
     for part, k in _near_periods(law.shape, own_m, other_m, [law.safe_m] * len(step), lasts):
         if not moves[k]:
