@@ -59,7 +59,7 @@ def as_seen(trace: Trace, robot: str) -> Inequalities:
 
 def _current(trace: Trace, robot: str) -> OfRun:
     """The inequalities of a robot, but for those beside robots whose messages it lacks, or has old ones of."""
-    given, parts = inequalities_of(trace, robot, as_seen=True), len(parts_of(trace).owner)
+    given, parts = inequalities_of(trace, robot), len(parts_of(trace).owner)
     lacks = np.pad(unheard(trace, robot), ((0, 0), (parts, 0)))[given.sample, given.column]
     if acts_on_old(trace) and robot in trace.ugvs:
         lacks |= (given.column >= parts) & (given.column < parts + len(trace.ugvs))

@@ -9,11 +9,12 @@ from builders.runs import run_of
 from oracles.mutants import PATIENCE
 
 from airground_drake.report.document import expected_numbers
-from airground_drake.report.interventions import farthest_from_prediction, interventions, messages
+from airground_drake.report.interventions import avoidance, farthest_from_prediction, interventions, messages
 from airground_drake.report.metrics import of_run
 from airground_drake.scenario.load import load
 from airground_drake.sim.simulation import simulate
 from airground_drake.sim.trace import Trace
+from airground_drake.verify import judge
 
 Run = Callable[[str, str], Trace]
 
@@ -73,6 +74,13 @@ def test_messages_beside_always_on_supervision(run: Run) -> None:
     }  # fmt: skip
     assert (messages(run("case_a", "b")) or {})["always_on"] == {"proposals": 1200, "answers": 0}
     assert messages(run("case_a", "a")) is None
+
+
+def test_avoidance_binds_where_a_robot_saw_itself() -> None:
+    measured = ["sensing.position_error_m=0.02", "control.avoidance_gain_1_s=20", "duration_s=8"]
+    trace = simulate(load("minimal", measured), "a")
+    (found,) = judge(trace, ["SAFE-HYP"])
+    assert avoidance(trace)["ugv1"]["binding"] == found.evidence["inequalities_that_bind"]["ugv beside obstacle"] > 20
 
 
 def test_a_ugv_is_near_its_prediction_but_not_on_it(run: Run) -> None:

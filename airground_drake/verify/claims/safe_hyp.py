@@ -426,7 +426,7 @@ def _binding(trace: Trace) -> tuple[int, dict[str, int]]:
     beside = ["obstacle" for _ in parts_of(trace).owner] + [kind_of(robot) for robot in trace.robots]
     in_range = 0
     for robot in trace.robots:
-        given = inequalities_of(trace, robot, as_seen=trace.scenario.sensing is not None)
+        given = inequalities_of(trace, robot)
         in_range += int((given.distance <= trace.scenario.control.sensing_range_m).sum())
         for column in given.column[given.slack(trace.chosen(robot)) <= BINDING_M_S].tolist():
             count[f"{kind_of(robot)} beside {beside[column]}"] += 1

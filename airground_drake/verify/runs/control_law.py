@@ -73,20 +73,18 @@ def _towards_unsure(
     return rows, normal, bound
 
 
-def inequalities_of(trace: Trace, robot: str, *, as_seen: bool = False) -> Inequalities:
-    """The inequalities of a robot at the control samples of its run, for all bodies within sensing range."""
+def inequalities_of(trace: Trace, robot: str) -> Inequalities:
+    """The inequalities of a robot at the control samples of its run, for all bodies that it saw within its range."""
     samples = trace.sample_rows
     parts = parts_of(trace)
     control = trace.scenario.control
     planar, pairs = is_planar(trace, robot), pairs_beside(trace, robot)
-
-    def place(body: str) -> Array:
-        return trace.as_seen(robot, body) if as_seen else trace.position(body)[samples]
-
-    own = place(robot)
+    own = trace.as_seen(robot, robot)
     others = [name for name in trace.robots if name != robot]
     near = contacts(trace, own, samples, control.sensing_range_m, planar=planar)
-    there = [heard_places(trace, robot, name) if pairs[name].asynchronous else place(name) for name in others]
+    there = [
+        heard_places(trace, robot, name) if pairs[name].asynchronous else trace.as_seen(robot, name) for name in others
+    ]
     old = [unsure_m(trace, robot, name) if pairs[name].asynchronous else np.zeros(len(own)) for name in others]
     offset, unsure = own[:, None] - np.stack(there, axis=1), np.stack(old, axis=1)
     apart = np.sqrt(np.square(offset).sum(axis=2))

@@ -230,7 +230,7 @@ def _with_reaction(trace: Trace, pair: Pair, gaps: Array, encounter: Encounter) 
     periods, t_s = periods_of(trace, pair), encounter.t_s
     before = np.flatnonzero((trace.t[periods.row] < t_s) | (periods.row == pair.row))
     k = int(before[-1])
-    given = inequalities_of(trace, pair.first, as_seen=trace.scenario.sensing is not None)
+    given = inequalities_of(trace, pair.first)
     number = np.searchsorted(trace.sample_rows, periods.row)
     blocked = [_blocked_by(trace, pair, periods, period, given, int(number[period])) for period in before.tolist()]
     short = gaps[periods.row[before]] < pair.required_m - DISTANCE_TOLERANCE_M
