@@ -42,7 +42,7 @@ def occupancy(data: bytes, *, occupied_above: float, free_below: float, negate: 
 
 def _decoded(data: bytes) -> tuple[NDArray[np.uint16], Cells]:
     """Sum of red, green and blue of each cell, 0 to WHITE, and whether it is opaque; the lowest row first."""
-    # Of 16 bits per cell, the lower eight are lost.
+    # A brightness of 16 bits is rounded down to 8 bits.
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # counted here

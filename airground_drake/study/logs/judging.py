@@ -41,6 +41,7 @@ KEPT, BROKEN, OPEN = "kept", "NOT KEPT", "open"
 LAST_S = 1.0  # time before the least distance over which approaches are attributed to bodies, s
 STEPS = 100  # number of parts of that time in which both motions are separated
 STAMP_S = 2e-9  # accuracy of the time between two stamps
+AT_ONCE = 2000  # differences of places whose distances are computed in one go
 HALVINGS = 60  # halvings of an interval in the search for a time
 # Share of a scenario's duration that a log may lack to cover all of it: two intervals, but no more than this. A body
 # may begin later than the log, or end earlier, by no more, either.
@@ -201,10 +202,14 @@ def courses(tracks: Tracks, scenario: Json) -> dict[tuple[str, str], list[tuple[
     courses_m = {}
     for pair, own, other in _tracked(tracks.bodies, scenario, _whole(tracks.bodies)):
         times = [_knots(own, other, span) for span in _common(own, other)] if len(other.t_s) else []
-        courses_m[pair.robot, pair.other] = [
-            (t_s, _signed(pair.shape, own.at(t_s) - other.at(t_s)) - pair.radii_m) for t_s in times
-        ]
+        courses_m[pair.robot, pair.other] = [(t_s, _course(pair, own.at(t_s) - other.at(t_s))) for t_s in times]
     return courses_m
+
+
+def _course(pair: Pair, apart: Array) -> Array:
+    # In slices: a long log beside a polygon of many corners would need gigabytes.
+    slices = np.array_split(apart, 1 + len(apart) // AT_ONCE)
+    return np.concatenate([_signed(pair.shape, places) for places in slices]) - pair.radii_m
 
 
 def _tracked(bodies: Mapping[str, Track], scenario: Json, whole: Span) -> Iterator[tuple[Pair, Track, Track]]:

@@ -6,6 +6,7 @@ import shutil
 import sqlite3
 import sys
 import tempfile
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,8 @@ from airground_drake.base import files
 from airground_drake.base.errors import LogError
 from airground_drake.scenario.load import load, resolved
 from airground_drake.study.logs import bags, text
-from airground_drake.study.logs.judging import judge
+from airground_drake.study.logs.judging import courses, judge
+from airground_drake.study.logs.tracks import Track, Tracks
 
 FULL = logs.motion(every=4)
 LONG = logs.text(logs.long(FULL))
@@ -384,3 +386,21 @@ def test_a_package_that_is_missing_is_named_in_one_line(
     monkeypatch.setitem(sys.modules, package, None)
     said = judged_or_refused(path, document)
     assert f"{says}: {bags.HINT}" in said
+
+
+def test_distances_of_a_long_log_beside_many_corners_need_little_memory() -> None:
+    """All differences of places and corners at once would take 400 MB."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 301)[1:]
+    corners = np.round(np.column_stack([5.0 + np.cos(angles), 3.0 + np.sin(angles)]), 4).tolist()
+    document = resolved(load("minimal", {"obstacles.rock": {"polygon_m": corners}}))
+    t_s = np.linspace(0.0, 20.0, 20_001)
+    places_m = np.column_stack([0.5 * t_s, np.zeros((len(t_s), 2))])
+    tracemalloc.start()
+    try:
+        ((times, gaps_m),) = courses(Tracks({"ugv1": Track(t_s, places_m, 0.1)}, [], []), document)["ugv1", "rock"]
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert len(times) == len(gaps_m) == 20_001
+    assert float(gaps_m.min()) == pytest.approx(2.0, abs=1e-3)
+    assert most < 100e6
