@@ -52,7 +52,8 @@ def conduct(
     if stopping is not None and spec.dependent:
         raise ValueError(f"--stop-when needs independent draws; not independent: {', '.join(spec.dependent)}")
     wanted = range(spec.combinations if number is None else number)
-    asked = wanted.stop * len(spec.runs or spec.base().runs) * len(spec.claims or tuple(RUN_CLAIMS))
+    base = spec.base()
+    asked = wanted.stop * len(spec.runs or base.runs) * len(spec.claims or (*RUN_CLAIMS, *base.claims))
     if asked > MOST_ROWS:
         allowed = f"{MOST_ROWS:g} rows, one for each draw, run and claim"
         raise LimitError(spec.name, f"{Decimal(wanted.stop):.3g} draws ({Decimal(asked):.3g} rows)", allowed)
