@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 from study.campaign.test_evidence import row
 
-from airground_drake.base.errors import FolderError
+from airground_drake.base.errors import FolderError, LimitError
+from airground_drake.base.registry import RUN_CLAIMS
 from airground_drake.commands.campaign import _summary
-from airground_drake.scenario.estimate import DEFAULT_LIMITS
+from airground_drake.scenario.estimate import DEFAULT_LIMITS, MOST_ROWS
 from airground_drake.study.campaign.conduct import EVIDENCE, PAGE, Stopping, conduct
 from airground_drake.study.campaign.spec import Spec, load_spec
 from airground_drake.study.campaign.statistics import confidence_sequence
@@ -49,6 +50,13 @@ def test_a_rule_needs_independent_draws(drawn: str, tmp_path: Path) -> None:
         conduct(spec(tmp_path, drawn), tmp_path / "out", draw_50_first, 100, stopping=rule)
     found = conduct(spec(tmp_path, drawn), tmp_path / "out", draw_50_first, 100)
     assert (found["dependent"], found["claims"][0]["anytime"]) == (["duration_s"], None)
+
+
+def test_a_scenario_s_claims_count_towards_the_limit_of_rows(tmp_path: Path) -> None:
+    fits = MOST_ROWS // (2 * len(tuple(RUN_CLAIMS)))  # two runs
+    own = spec(tmp_path, "seed: {integer: [0, 9]}}\nset: {claims: {OWN-CLAIM: 'mine.py:Mine'}")
+    with pytest.raises(LimitError, match="allowed: 4e"):
+        conduct(own, tmp_path / "out", draw_50_first, fits)
 
 
 def test_a_campaign_goes_on_only_with_the_same_third_party_code(tmp_path: Path) -> None:
