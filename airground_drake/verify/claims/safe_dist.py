@@ -103,7 +103,7 @@ class SafeDist(TheoremClaim):
         ranges = [
             Hypothesis.of(
                 "sensing range less d - W/A + (c + W) h",
-                f"{pair.kind}: the sensing range is at least d - W/A and what the two approach each other in a period",
+                f"{pair.kind}: two bodies out of sensing range cannot come nearer than d - W/A within a control period",
                 decimal(inputs["sensing_range_m"])
                 - left_m(inputs, pair)
                 - (pair.closing_m_s + disturbance_m_s(inputs, pair)) * h,

@@ -8,7 +8,6 @@ from airground_drake.model.trigger.bayes import bayes_risk
 from airground_drake.scenario.schema import Scenario
 from airground_drake.verify.claims.thr_root import ThrRoot, as_floats, rule_of, two_signs
 from airground_drake.verify.engines.signs import RootInterval, ThresholdRule, ball, enclose, sign, value
-from airground_drake.verify.finding import Finding
 from airground_drake.verify.model.levels import NUMBERS
 from airground_drake.verify.model.theorem import Hypothesis, TheoremClaim
 
@@ -17,7 +16,7 @@ PRINTED = "Threshold.printed_is_worse"
 
 class ThrOpt(TheoremClaim):
     id = "THR-OPT"
-    summary = "The threshold of least Bayes risk is the root of the corrected equation, not of the printed one."
+    summary = "The threshold of least Bayes risk is the root of the corrected equation."
     statement = (
         "Without initial deviation the root of the threshold equation is the only minimiser of the Bayes risk over all "
         "zeta; the root of the printed equation has a higher risk, unless c1 = c2: then it is the same root. With any "
@@ -44,7 +43,7 @@ class ThrOpt(TheoremClaim):
         "minimises the risk with an initial deviation."
     )
 
-    theorems: tuple[str, ...] = (
+    theorems = (
         "Threshold.least",
         PRINTED,
         "Threshold.not_least_with_deviation",
@@ -55,12 +54,10 @@ class ThrOpt(TheoremClaim):
     def inputs(self, scenario: Scenario) -> dict[str, Any]:
         return ThrRoot().inputs(scenario)
 
-    def check(self, inputs: dict[str, Any]) -> Finding:
-        """Check the hypotheses; the theorem about the printed equation needs c1 and c2 that differ."""
-        claim, rule = ThrOpt(), rule_of(inputs)
-        if rule.c1 == rule.c2:
-            claim.theorems = tuple(name for name in self.theorems if name != PRINTED)
-        return TheoremClaim.check(claim, inputs)
+    def cited(self, inputs: dict[str, Any]) -> tuple[str, ...]:
+        """All theorems, but the one about the printed equation only if c1 and c2 differ."""
+        rule = rule_of(inputs)
+        return tuple(name for name in self.theorems if name != PRINTED or rule.c1 != rule.c2)
 
     def hypotheses(self, inputs: dict[str, Any]) -> list[Hypothesis]:
         rule = rule_of(inputs)

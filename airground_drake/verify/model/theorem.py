@@ -66,6 +66,10 @@ class TheoremClaim(ModelClaim):
         met, cases = (sum(column) for column in zip(*seen, strict=True))
         return replace(finding, evidence=finding.evidence | {"applies_to": met, "of": cases})
 
+    def cited(self, inputs: dict[str, Any]) -> tuple[str, ...]:
+        """Those of `theorems` that say something about these constants."""
+        return self.theorems
+
     def counterexample(self, inputs: dict[str, Any], broken: Hypothesis) -> dict[str, Any] | None:
         """A case that refutes the claim if this hypothesis fails; None: the claim is only left open."""
         return None
@@ -75,7 +79,7 @@ class TheoremClaim(ModelClaim):
         broken = [hypothesis for hypothesis in hypotheses if not hypothesis.holds]
         named = [hypothesis for hypothesis in hypotheses if hypothesis.hypothesis == self.margin_of]
         shown = broken[0] if broken else min(named, key=lambda hypothesis: hypothesis.margin)
-        evidence = grounds(self.theorems, hypotheses) | self.numbers(inputs)
+        evidence = grounds(self.cited(inputs), hypotheses) | self.numbers(inputs)
         finding = Finding(
             "proved", shown.margin, shown.unit, evidence=evidence, quantity=shown.hypothesis, exercised=len(hypotheses)
         )
