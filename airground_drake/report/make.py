@@ -24,7 +24,7 @@ class Wanted(NamedTuple):
     formats: tuple[str, ...] = tuple(folder.PAGES)  # of html, json and junit; traces and diagram are always written
     command: str = ""  # how to make this report again
     kept: Path | None = None  # folder of kept findings about the model, see `judge_model`; None: everything anew
-    audited: bool = False  # whether to make all findings about the paper, of which each must then be demonstrated
+    audited: bool = False  # whether all findings about the paper are made; each must then be demonstrated
     limits: Limits = DEFAULT_LIMITS  # what the scenario may ask for
     seeds: int = 0  # with how many seeds, from 1 on, distances and arrivals are counted; 0: none
 

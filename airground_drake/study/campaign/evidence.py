@@ -178,7 +178,7 @@ def _where(violated: pd.Series, drawn: pd.DataFrame) -> Json | None:
 
 
 def _by_chance(table: Array, method: MonteCarloMethod | None = None) -> tuple[float, float]:
-    """Probability of differences as large if the keys have no effect; and -chi-squared per cell, for equal ones."""
+    """Probability of differences as large if the keys have no effect; -chi-squared per cell, which breaks ties."""
     if min(table.shape) < 2:
         return 1.0, 0.0
     chi2 = chi2_contingency(table, correction=False, method=method)

@@ -207,6 +207,7 @@ def courses(tracks: Tracks, scenario: Json) -> dict[tuple[str, str], list[tuple[
 
 
 def _course(pair: Pair, apart: Array) -> Array:
+    """Distances of the surfaces of a pair at differences of its places (K, 3), m: (K,), m."""
     # In slices: a long log beside a polygon of many corners would need gigabytes.
     slices = np.array_split(apart, 1 + len(apart) // AT_ONCE)
     return np.concatenate([_signed(pair.shape, places) for places in slices]) - pair.radii_m
